@@ -1,0 +1,84 @@
+"""What the commands share: JSON for machines, tables for people, quantities from the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from turnmill_core.operation_file import parse_quantity
+from turnmill_ros.errors import InputError
+
+console = Console(highlight=False)
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print JSON for machines (SI units, null where there is none).")]
+OperationArgument = Annotated[
+    str, typer.Argument(metavar="OP", help="Operation file (YAML), or the name of a shipped one: turnmill operation --list.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the operation, e.g. tool.teeth=4. Repeatable."),
+]
+
+
+def quantity(text: str | None, unit: str, option: str) -> float | None:
+    """SI value of a command line quantity such as ``3350rpm``; None stays None."""
+    return None if text is None else parse_quantity(text, unit, option)
+
+
+def plain(value: Any) -> Any:
+    """JSON form: NaN and infinity become null, arrays lists."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        return int(value)
+    return value
+
+
+def print_json(value: Any, indent: int | None = 2) -> None:
+    """Print one JSON document on stdout."""
+    typer.echo(json.dumps(plain(value), indent=indent, ensure_ascii=False, allow_nan=False))
+
+
+def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """Print a table."""
+    shown = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for k, name in enumerate(columns):
+        shown.add_column(name, justify="left" if k == 0 else "right")
+    for row in rows:
+        shown.add_row(*row)
+    console.print(shown)
+
+
+def new_file(path: Path, force: bool = False) -> Path:
+    """Check that an output file can be written and does not exist yet; return it."""
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists already; choose another name or remove it first")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    return path
+
+
+@contextmanager
+def progress(text: str, quiet: bool = False) -> Iterator[Callable[[float], None]]:
+    """Progress bar on stderr; the yielded function takes the done share in [0, 1]."""
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
+        console=Console(stderr=True), transient=True, disable=quiet,
+    ) as bars:
+        task = bars.add_task(text, total=1.0)
+        yield lambda share: bars.update(task, completed=min(1.0, share))

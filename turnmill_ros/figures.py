@@ -1,0 +1,184 @@
+"""Bokeh figures of signals, verdicts, loads and stability; used by the report.
+
+Each function takes plain values and returns a bokeh figure with axes, units and legend. Colours
+are the Okabe-Ito palette, which survives colour blindness; states also differ by name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool, Label, LinearColorMapper, Range1d, Span
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+
+STATE_COLOURS = {
+    ChatterKind.UNKNOWN: "#ffffff",
+    ChatterKind.AIR: "#bbbbbb",
+    ChatterKind.STABLE: "#009e73",
+    ChatterKind.MARGINAL: "#f0e442",
+    ChatterKind.HOPF: "#d55e00",
+    ChatterKind.FLIP: "#cc79a7",
+    ChatterKind.FLIP_OR_RUNOUT: "#e69f00",
+}
+LINE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+WIDTH = 980
+
+
+def _figure(title: str, x: str, y: str, height: int = 260, **options: object) -> figure:
+    plot = figure(title=title, x_axis_label=x, y_axis_label=y, width=WIDTH, height=height,
+                  tools="pan,box_zoom,xwheel_zoom,reset,save", **options)
+    plot.toolbar.logo = None
+    plot.title.text_font_size = "13pt"
+    plot.xaxis.axis_label_text_font_size = plot.yaxis.axis_label_text_font_size = "11pt"
+    plot.min_border_left = 70
+    return plot
+
+
+def _legend_right(plot: figure) -> None:
+    plot.add_layout(plot.legend[0], "right")
+    plot.legend.label_text_font_size = "10pt"
+    plot.legend.click_policy = "hide"
+
+
+def verdict_band(segments: Sequence[tuple[float, float, ChatterKind]], x_range: Range1d | None = None) -> figure:
+    """Timeline of verdicts: one coloured bar per segment (start [s], end [s], state)."""
+    options = {} if x_range is None else {"x_range": x_range}
+    plot = _figure("Verdict", "time [s]", "", 150, y_range=(0, 1), **options)
+    for kind in ChatterKind:
+        bars = [(a, b) for a, b, state in segments if state is kind]
+        if bars:
+            plot.quad(left=[a for a, _ in bars], right=[b for _, b in bars], bottom=0, top=1,
+                      fill_color=STATE_COLOURS[kind], line_color="#444444", line_width=0.5, legend_label=kind.name)
+    plot.yaxis.visible = False
+    plot.ygrid.visible = False
+    if segments:
+        _legend_right(plot)
+    return plot
+
+
+def spectrogram(
+    times: NDArray[np.float64], frequencies: NDArray[np.float64], level_db: NDArray[np.float64], title: str,
+    unit: str, x_range: Range1d | None = None,
+    chatter: Sequence[tuple[float, float]] = (), tooth_passing: Sequence[tuple[float, float]] = (),
+) -> figure:
+    """Spectrogram: level_db (frequencies, times); chatter and tooth passing as (time [s], frequency [Hz])."""
+    options = {} if x_range is None else {"x_range": x_range}
+    plot = _figure(title, "time [s]", "frequency [Hz]", 340, y_range=(float(frequencies[0]), float(frequencies[-1])),
+                   **options)
+    high = float(np.max(level_db)) if level_db.size else 0.0
+    mapper = LinearColorMapper(palette="Viridis256", low=high - 70, high=high)
+    plot.image(image=[level_db], x=float(times[0]), y=float(frequencies[0]), dw=float(times[-1] - times[0]),
+               dh=float(frequencies[-1] - frequencies[0]), color_mapper=mapper)
+    if tooth_passing:
+        plot.line([t for t, _ in tooth_passing], [f for _, f in tooth_passing], color="#ffffff", line_width=1.5,
+                  line_dash="dashed", legend_label="tooth passing")
+    if chatter:
+        plot.scatter([t for t, _ in chatter], [f for _, f in chatter], color="#d55e00", line_color="#ffffff",
+                     line_width=0.5, size=6, legend_label="chatter line")
+    if tooth_passing or chatter:
+        plot.legend.background_fill_color = "#999999"
+        _legend_right(plot)
+    from bokeh.models import ColorBar
+
+    plot.add_layout(ColorBar(color_mapper=mapper, title=f"dB re 1 {unit}/\u221aHz", width=10), "right")
+    return plot
+
+
+def ratios(verdicts: Sequence[Verdict], start_ns: int, enter: float, leave: float,
+           x_range: Range1d | None = None) -> figure:
+    """Asynchronous and half-order ratios over time with the decision thresholds `enter` and `leave`."""
+    options = {} if x_range is None else {"x_range": x_range}
+    plot = _figure("What the verdict stands on", "time [s]", "share of energy [1]", 260, y_range=(-0.02, 1.02), **options)
+    time = [(v.window_end_ns - start_ns) * 1e-9 for v in verdicts]
+    for name, values, colour, dash in (
+        ("asynchronous", [v.asynchronous_ratio for v in verdicts], LINE_COLOURS[0], "solid"),
+        ("half order", [v.half_order_ratio for v in verdicts], LINE_COLOURS[3], "dashed"),
+        ("confidence", [v.confidence for v in verdicts], "#888888", "dotted"),
+    ):
+        plot.line(time, values, legend_label=name, color=colour, line_width=2, line_dash=dash)
+    plot.add_layout(Span(location=enter, dimension="width", line_color="#444444", line_dash="dashed"))
+    plot.add_layout(Label(x=5, y=enter, x_units="screen", text="enter", text_font_size="9pt", y_offset=1))
+    plot.add_layout(Span(location=leave, dimension="width", line_color="#444444", line_dash="dotted"))
+    plot.add_layout(Label(x=45, y=leave, x_units="screen", text="leave", text_font_size="9pt", y_offset=1))
+    _legend_right(plot)
+    return plot
+
+
+def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], title: str, unit: str,
+             tooth_passing: float = math.nan, family: Sequence[float] = (), chatter: float = math.nan) -> figure:
+    """Amplitude spectrum on a logarithmic axis with tooth harmonics and the chatter family marked."""
+    floor = max(float(np.max(amplitude)) * 1e-5, 1e-30) if amplitude.size else 1e-30
+    plot = _figure(title, "frequency [Hz]", f"amplitude [{unit}]", 320, y_axis_type="log")
+    source = ColumnDataSource({"f": frequencies, "a": np.maximum(amplitude, floor)})
+    plot.line("f", "a", source=source, color=LINE_COLOURS[0], line_width=1.2, legend_label="spectrum")
+    plot.add_tools(HoverTool(tooltips=[("frequency", "@f{0.0} Hz"), ("amplitude", "@a")], mode="vline"))
+    top = float(frequencies[-1]) if frequencies.size else 0.0
+
+    def amplitude_near(f: float) -> float:
+        near = np.abs(frequencies - f) <= 2 * (frequencies[1] - frequencies[0])
+        return float(np.max(amplitude[near], initial=floor))
+
+    if math.isfinite(tooth_passing) and tooth_passing > 0:
+        harmonics = [k * tooth_passing for k in range(1, int(top / tooth_passing) + 1)]
+        plot.scatter(harmonics, [amplitude_near(f) for f in harmonics], marker="inverted_triangle", size=8,
+                     color="#000000", legend_label="tooth harmonics")
+    if family:
+        plot.scatter(list(family), [amplitude_near(f) for f in family], marker="diamond", size=11,
+                     color=LINE_COLOURS[4], line_color="#000000", legend_label="chatter family")
+    if math.isfinite(chatter):
+        plot.add_layout(Span(location=chatter, dimension="height", line_color=LINE_COLOURS[1], line_dash="dashed"))
+        plot.add_layout(Label(x=chatter, y=float(np.max(amplitude)), text=f"{chatter:.1f} Hz", x_offset=4,
+                              text_color=LINE_COLOURS[1], text_font_size="10pt", y_offset=-12))
+    _legend_right(plot)
+    return plot
+
+
+def forces(angle: NDArray[np.float64], force: NDArray[np.float64], torque: NDArray[np.float64]) -> tuple[figure, figure]:
+    """Forces on the tool (n, 3) [N], tool frame, and tool torque (n,) [N m] over one revolution (angle [rad])."""
+    degrees = np.degrees(angle)
+    plot = _figure("Predicted forces on the tool over one revolution (tool frame)", "tool rotation [deg]", "force [N]", 300)
+    for k, name in enumerate(("x feed", "y cross feed", "z tool axis")):
+        plot.line(degrees, force[:, k], color=LINE_COLOURS[k], line_width=2, legend_label=name,
+                  line_dash=("solid", "dashed", "dotdash")[k])
+    _legend_right(plot)
+    second = _figure("Predicted torque on the tool spindle", "tool rotation [deg]", "torque [N m]", 220,
+                     x_range=plot.x_range)
+    second.line(degrees, torque, color=LINE_COLOURS[0], line_width=2)
+    return plot, second
+
+
+def lines_over_time(title: str, unit: str, time: Sequence[float], named: dict[str, Sequence[float]],
+                    x_range: Range1d | None = None) -> figure:
+    """Named values over time [s]."""
+    options = {} if x_range is None else {"x_range": x_range}
+    plot = _figure(title, "time [s]", unit, 240, **options)
+    dashes = ("solid", "dashed", "dotdash", "dotted")
+    for k, (name, values) in enumerate(named.items()):
+        plot.line(list(time), list(values), color=LINE_COLOURS[k % len(LINE_COLOURS)], line_width=2,
+                  line_dash=dashes[k % len(dashes)], legend_label=name)
+    if named:
+        _legend_right(plot)
+    return plot
+
+
+def lobes(tool_speeds_rpm: NDArray[np.float64], limit_mm: NDArray[np.float64], at: tuple[float, float] | None,
+          title: str) -> figure:
+    """Stability limit [mm] over tool speed [rpm], with the operating point `at` (rpm, mm)."""
+    plot = _figure(title, "tool speed [rpm]", "axial depth of cut [mm]", 320)
+    top = float(np.max(limit_mm)) * 1.1
+    plot.varea(x=tool_speeds_rpm, y1=limit_mm, y2=np.full_like(limit_mm, top), color=LINE_COLOURS[1], alpha=0.25,
+               legend_label="chatter")
+    plot.varea(x=tool_speeds_rpm, y1=np.zeros_like(limit_mm), y2=limit_mm, color=LINE_COLOURS[2], alpha=0.25,
+               legend_label="stable")
+    plot.line(tool_speeds_rpm, limit_mm, color="#000000", line_width=2, legend_label="stability limit")
+    if at is not None:
+        plot.scatter([at[0]], [at[1]], size=13, marker="star", color=LINE_COLOURS[0], line_color="#000000",
+                     legend_label="operating point")
+    plot.y_range = Range1d(0, top)
+    _legend_right(plot)
+    return plot

@@ -1,0 +1,48 @@
+"""Finding an operation by file or shipped name, and changing single values of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from turnmill_core.operation import Operation
+from turnmill_core.operation_file import parse_operation, read_operation, shipped_operations
+from turnmill_ros.errors import InputError
+
+
+def find_operation(name: str, changes: Iterable[str] = ()) -> Operation:
+    """Operation from a file path or a shipped name, with ``key.path=value`` changes applied.
+
+    A change makes a new operation text (and hash), so that whatever is computed or recorded from
+    it says exactly what was used. Raises InputError or OperationError.
+    """
+    path = Path(name)
+    shipped = shipped_operations()
+    if not path.is_file():
+        stem = path.name.removesuffix(".yaml")
+        if stem not in shipped or path.parent != Path("."):
+            raise InputError(f"{name}: no such operation file; shipped operations are {', '.join(sorted(shipped))}")
+        path = shipped[stem]
+    operation = read_operation(path)
+    changes = list(changes)
+    return parse_operation(changed_text(operation.text, changes), f"{name} with changes") if changes else operation
+
+
+def changed_text(text: str, changes: Iterable[str]) -> str:
+    """Operation text with each ``key.path=value`` set; the path must name an existing mapping."""
+    document: dict[str, Any] = yaml.safe_load(text)
+    for change in changes:
+        key, equals, value = change.partition("=")
+        if not equals or not key or not value:
+            raise InputError(f"--set {change!r}: expected KEY.PATH=VALUE, for example tool.teeth=4")
+        *parents, leaf = key.strip().split(".")
+        node: Any = document
+        for parent in parents:
+            node = node.get(parent) if isinstance(node, dict) else None
+            if not isinstance(node, dict):
+                raise InputError(f"--set {change!r}: the operation has no mapping {parent!r}")
+        node[leaf] = yaml.safe_load(value)
+    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
