@@ -25,7 +25,7 @@ from turnmill_ros.interfaces import Types
 _TYPECODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint8): "B"}
 
 
-def _make(types: Types, name: str, **fields: Any) -> Any:
+def _make(types: Types, name: str, /, **fields: Any) -> Any:
     """Message of type `name`; numpy arrays become what the class wants.
 
     A generated ROS class copies an array element by element, except an ``array.array`` set as an
@@ -248,7 +248,7 @@ def margin_to_message(margin: Any, stamp_ns: int, operation_hash: str, types: Ty
 
 
 def margin_from_message(message: Any) -> dict[str, Any]:
-    """Fields of a turnmill_msgs/StabilityMargin by name: stable_depths (n, 2) [m], multipliers complex, plus stamp_ns."""
+    """Fields of a turnmill_msgs/StabilityMargin by name: stable_depths (n, 2), multipliers complex, and stamp_ns."""
     return {
         "stamp_ns": time_from_message(message.header.stamp),
         "stable_depths": _doubles(message.stable_depths).reshape(-1, 2),
@@ -297,5 +297,6 @@ def operation_from_message(message: Any) -> Operation:
     from turnmill_core.operation_file import parse_operation
 
     operation = parse_operation(message.yaml, name=f"operation {message.name!r} in the recording")
-    require(operation.sha256 == message.sha256, "operation sha256", message.sha256, "", f"{operation.sha256}, that of the text")
+    require(operation.sha256 == message.sha256, "operation sha256", message.sha256, "",
+            f"{operation.sha256}, that of the text")
     return operation

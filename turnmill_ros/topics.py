@@ -122,7 +122,7 @@ def find(name: str) -> Topic | None:
 
 
 def recorded_name(name: str) -> str:
-    """Relative name under which an output found in a recording is published again: ``/x/y`` becomes ``recorded/x/y``."""
+    """Relative name under which a replay publishes a recorded output: ``/x/y`` becomes ``recorded/x/y``."""
     return f"{RECORDED}/{name.strip('/')}"
 
 
