@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 
 import typer
 from click.exceptions import ClickException
@@ -31,9 +32,14 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code; errors go to stderr as one line."""
+    return guarded(lambda: app(args=arguments, prog_name="turnmill", standalone_mode=False))
+
+
+def guarded(command: Callable[[], object]) -> int:
+    """Call `command` and return an exit code: an int that it returns, 0, or the code of its error."""
     show = os.environ.get("TURNMILL_TRACEBACK") == "1"
     try:
-        result = app(args=arguments, prog_name="turnmill", standalone_mode=False)
+        result = command()
         return result if isinstance(result, int) else 0
     except ClickException as error:
         error.show()

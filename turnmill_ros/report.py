@@ -1,0 +1,165 @@
+"""HTML reports: one self-contained file, pictures by bokeh, readable without network."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from bokeh.embed import components
+from bokeh.models import Range1d
+from bokeh.resources import INLINE
+
+from turnmill_core.cutting.loads import CuttingLoads
+from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+from turnmill_core.operation import Conditions, Operation
+from turnmill_core.operation_file import describe
+from turnmill_ros import figures
+from turnmill_ros.analysis import CHATTER, Analysis, Segment, iso_time, summary, timeline
+from turnmill_ros.predictions import Predictions
+from turnmill_ros.signals import spectrogram, stretch
+
+RPM = 60 / (2 * math.pi)
+STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222 }
+h1 { font-size: 1.6em; margin-bottom: 0.1em } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc }
+table { border-collapse: collapse; margin: 0.6em 0 } td, th { padding: 0.25em 0.9em; border-bottom: 1px solid #e3e3e3;
+text-align: right } td:first-child, th:first-child { text-align: left } .note { color: #555 }
+.state { display: inline-block; min-width: 8em; padding: 0 0.5em; border: 1px solid #444; text-align: center }
+"""
+
+
+def recording_report(output: Path, analysis: Analysis, predictions: Predictions | None = None) -> None:
+    """Write the report of one analysed recording; `predictions` are the loads and margins of a replayed bag."""
+    start = analysis.start_ns
+    x_range = Range1d(0.0, max(analysis.seconds(analysis.end_ns), 1e-3))
+    plots: list[tuple[str, Any]] = []
+    band = [(analysis.seconds(s.start_ns), analysis.seconds(s.end_ns), s.state) for s in analysis.segments]
+    plots.append(("Over time", figures.verdict_band(band, x_range)))
+    channel = analysis.verdicts[0].channel if analysis.verdicts else ""
+    picture = spectrogram(analysis.path, channel, start) if channel else None
+    if picture is not None:
+        stamped = [((v.window_end_ns - start) * 1e-9, v) for v in analysis.verdicts]
+        chatter = [(t, v.chatter_frequency) for t, v in stamped if v.state in CHATTER and math.isfinite(v.chatter_frequency)]
+        passing = [(t, v.tooth_passing_frequency) for t, v in stamped]
+        plots.append(("", figures.spectrogram(
+            picture.times, picture.frequencies, picture.level_db, f"Spectrogram of {_named(picture.channel)}",
+            picture.channel.unit, x_range, chatter, passing)))
+    config = analysis.config
+    plots.append(("", figures.ratios(analysis.verdicts, start, config.enter, config.leave, x_range)))
+    if predictions is not None:
+        plots += [("Predicted along the way" if k == 0 else "", p) for k, p in enumerate(predictions.plots(start, x_range))]
+    plots += _spectra(analysis, channel)
+    text = _headline(analysis)
+    _write(output, f"turnmill: {analysis.path.name}", [
+        f"<h1>{escape(analysis.operation.name)}</h1>",
+        f"<p class=note>{escape(str(analysis.path.name))}, recorded {iso_time(start)}, "
+        f"judged channel {escape(channel or 'none')}</p>",
+        f"<p><b>{escape(text)}</b></p>", _timeline_table(analysis), _summary_table(analysis),
+    ], plots, [_operation_tables(analysis.operation)])
+
+
+def forces_report(output: Path, op: Operation, cut: Conditions, loads: CuttingLoads) -> None:
+    """Write the picture of forces and torque over one tool revolution."""
+    plots = [("", p) for p in figures.forces(loads.angle, loads.force_tool, loads.tool_torque)]
+    _write(output, f"turnmill forces: {op.name}", [
+        f"<h1>{escape(op.name)}</h1>",
+        f"<p class=note>tool {cut.tool_speed * RPM:g} rpm, workpiece {cut.workpiece_speed * RPM:g} rpm, "
+        f"depth {cut.depth * 1e3:g} mm</p>",
+    ], plots, [_operation_tables(op)])
+
+
+def _named(channel: Any) -> str:
+    where = f", {channel.location}" if channel.location else ""
+    return f"{channel.name} ({channel.quantity.replace('_', ' ')}{where})"
+
+
+def _headline(analysis: Analysis) -> str:
+    figures_of = summary(analysis)
+    if figures_of["chatter_s"] > 0:
+        return (f"Chatter for {figures_of['chatter_s']:.1f} s of {figures_of['in_cut_s']:.1f} s in the cut, "
+                f"at {figures_of['chatter_frequency_hz']:.1f} Hz.")
+    if figures_of["in_cut_s"] > 0:
+        return f"No chatter in {figures_of['in_cut_s']:.1f} s of cutting."
+    return "The tool was never seen in the cut."
+
+
+def _state(kind: ChatterKind) -> str:
+    return f'<span class=state style="background:{figures.STATE_COLOURS[kind]}">{kind.name}</span>'
+
+
+def _rows(rows: Sequence[Sequence[str]], header: Sequence[str]) -> str:
+    head = "".join(f"<th>{h}</th>" for h in header)
+    body = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
+    return f"<table><tr>{head}</tr>{body}</table>"
+
+
+def _timeline_table(analysis: Analysis) -> str:
+    def row(s: Segment) -> tuple[str, ...]:
+        frequency = f"{s.chatter_frequency:.1f}" if math.isfinite(s.chatter_frequency) else ""
+        return (_state(s.state), f"{analysis.seconds(s.start_ns):.2f}", f"{analysis.seconds(s.end_ns):.2f}", frequency,
+                f"{s.confidence:.2f}")
+
+    return "<h2>Timeline</h2>" + _rows([row(s) for s in timeline(analysis.segments)],
+                                       ("state", "from [s]", "to [s]", "chatter [Hz]", "confidence"))
+
+
+def _summary_table(analysis: Analysis) -> str:
+    values = summary(analysis)
+    rows = [(_state(ChatterKind[name]), f"{length:.2f}") for name, length in values["durations_s"].items() if length > 0]
+    counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in analysis.counts.items())
+    return "<h2>Time in each state</h2>" + _rows(rows, ("state", "time [s]")) + f"<p class=note>{escape(counts)}</p>"
+
+
+def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
+    """One spectrum per state in the cut: up to one second at the end of its longest segment."""
+    plots = []
+    for kind in (ChatterKind.STABLE, *CHATTER, ChatterKind.FLIP_OR_RUNOUT):
+        segments = [s for s in analysis.segments if s.state is kind]
+        if not segments:
+            continue
+        longest = max(segments, key=lambda s: s.end_ns - s.start_ns)
+        verdicts = [v for v in analysis.verdicts if v.state is kind and longest.start_ns <= v.window_end_ns <= longest.end_ns]
+        middle = verdicts[len(verdicts) // 2]
+        length = min(1_000_000_000, max(longest.end_ns - longest.start_ns, middle.window_end_ns - middle.window_start_ns))
+        part = stretch(analysis.path, channel, middle.window_end_ns - length, middle.window_end_ns)
+        if part is None:
+            continue
+        frequencies, amplitude = part.amplitude_spectrum()
+        when = analysis.seconds(middle.window_end_ns)
+        plots.append(("Spectra" if not plots else "", figures.spectrum(
+            frequencies, amplitude, f"{kind.name}: {_named(part.channel)}, {length * 1e-9:.2f} s up to {when:.2f} s",
+            part.channel.unit, middle.tooth_passing_frequency, middle.chatter_family, middle.chatter_frequency)))
+    return plots
+
+
+def _operation_tables(op: Operation) -> str:
+    parts = [f"<h2>Operation</h2><p class=note>sha256 {op.sha256}</p>"]
+    for section, rows in describe(op):
+        parts.append(f"<h3>{escape(section)}</h3>"
+                     + _rows([(escape(k), escape(v)) for k, v in rows], ("quantity", "value")))
+    return "".join(parts)
+
+
+def _write(output: Path, title: str, head: Sequence[str], plots: Sequence[tuple[str, Any]], tail: Sequence[str]) -> None:
+    script, divs = components([p for _, p in plots]) if plots else ("", ())
+    body = [*head]
+    for (heading, _), div in zip(plots, divs, strict=True):
+        body += [f"<h2>{escape(heading)}</h2>" if heading else "", div]
+    body += tail
+    page = (f"<!doctype html><html lang=en><meta charset=utf-8><title>{escape(title)}</title><style>{STYLE}</style>"
+            f"{INLINE.render() if plots else ''}<body>{''.join(body)}{script}</body></html>")
+    write_text(output, page)
+
+
+def write_text(output: Path, text: str) -> None:
+    """Write a text file under its final name only when it is whole."""
+    part = output.with_name(output.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, output)
+    finally:
+        part.unlink(missing_ok=True)

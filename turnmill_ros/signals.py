@@ -1,0 +1,106 @@
+"""Signals of a bag in pictures' resolution: a bounded spectrogram, and one-second stretches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.monitoring.blocks import Channel, SensorBlock
+from turnmill_ros.monitor_feed import sensor_blocks
+
+MAX_COLUMNS = 600
+
+
+@dataclass(frozen=True)
+class Spectrogram:
+    """Power spectral density: times [s] since start_ns, frequencies [Hz], level [dB re 1 unit^2/Hz] (frequencies, times)."""
+
+    channel: Channel
+    times: NDArray[np.float64]
+    frequencies: NDArray[np.float64]
+    level_db: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A run of samples of one channel: start_ns, sample_rate [Hz], samples (n,)."""
+
+    channel: Channel
+    start_ns: int
+    sample_rate: float
+    samples: NDArray[np.float64]
+
+    def amplitude_spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Frequencies [Hz] and peak amplitudes (Hann window, a sine of amplitude A shows A)."""
+        window = np.hanning(len(self.samples))
+        spectrum = np.fft.rfft((self.samples - self.samples.mean()) * window)
+        return np.fft.rfftfreq(len(self.samples), 1 / self.sample_rate), np.abs(spectrum) * 2 / window.sum()
+
+
+def _index(block: SensorBlock, channel: str) -> int | None:
+    names = [c.name for c in block.channels]
+    return names.index(channel) if channel in names else None
+
+
+def spectrogram(path: Path, channel: str, start_ns: int, length: int = 1024) -> Spectrogram | None:
+    """Spectrogram of one channel with at most MAX_COLUMNS columns, whatever the recording's length.
+
+    Neighbouring columns are averaged in pairs whenever the limit is passed, so that memory stays
+    bounded. Returns None where the channel never occurs or is shorter than `length` samples.
+    """
+    columns: list[NDArray[np.float64]] = []
+    stamps: list[float] = []
+    merged, pending, pending_stamps = 1, [], []
+    rest, window = np.zeros(0), np.hanning(length)
+    found: tuple[Channel, float] | None = None
+    for block in sensor_blocks(path):
+        k = _index(block, channel)
+        if k is None:
+            continue
+        found = found or (block.channels[k], block.sample_rate)
+        rest = np.concatenate((rest, np.nan_to_num(block.samples[:, k].astype(np.float64))))
+        end = block.stamp_ns + round(len(block.samples) / block.sample_rate * 1e9)
+        while len(rest) >= length:
+            part = rest[:length]
+            power = np.abs(np.fft.rfft((part - part.mean()) * window)) ** 2
+            pending.append(power)
+            pending_stamps.append((end - start_ns) * 1e-9 - (len(rest) - length / 2) / block.sample_rate)
+            rest = rest[length:]
+            if len(pending) == merged:
+                columns.append(np.mean(pending, axis=0))
+                stamps.append(float(np.mean(pending_stamps)))
+                pending, pending_stamps = [], []
+            if len(columns) > MAX_COLUMNS:
+                columns = [(a + b) / 2 for a, b in zip(columns[::2], columns[1::2], strict=False)]
+                stamps = [(a + b) / 2 for a, b in zip(stamps[::2], stamps[1::2], strict=False)]
+                merged *= 2
+    if found is None or len(columns) < 2:
+        return None
+    density = np.array(columns).T * 2 / (found[1] * float(np.sum(window**2)))
+    return Spectrogram(found[0], np.array(stamps), np.fft.rfftfreq(length, 1 / found[1]),
+                       10 * np.log10(np.maximum(density, 1e-30)))
+
+
+def stretch(path: Path, channel: str, from_ns: int, to_ns: int) -> Stretch | None:
+    """Samples of one channel acquired in [from_ns, to_ns); None where there are fewer than 64 without a gap."""
+    parts: list[NDArray[np.float64]] = []
+    first: tuple[Channel, int, float] | None = None
+    expected = None
+    for block in sensor_blocks(path):
+        k = _index(block, channel)
+        end = block.stamp_ns + round(len(block.samples) / block.sample_rate * 1e9)
+        if k is None or end <= from_ns:
+            continue
+        if block.stamp_ns >= to_ns:
+            break
+        if expected is not None and block.first_sample != expected:
+            parts, first = [], None
+        expected = block.end_sample
+        first = first or (block.channels[k], block.stamp_ns, block.sample_rate)
+        parts.append(block.samples[:, k].astype(np.float64))
+    if first is None or sum(map(len, parts)) < 64:
+        return None
+    return Stretch(first[0], first[1], first[2], np.concatenate(parts))
