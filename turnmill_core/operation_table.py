@@ -84,13 +84,10 @@ def _cut_rows(op: Operation) -> Rows:
 
 def _derived_rows(op: Operation) -> Rows:
     cut, tool = op.conditions, op.tool
-    lower, upper = cut.cross_feed_span
-    start, end = (math.degrees(math.acos(max(-1.0, min(1.0, y / tool.radius)))) for y in (upper, lower))
     turns = cut.tool_speed / (2 * math.pi)
     return [
         ("tooth passing frequency", f"{op.tooth_passing_frequency:.6g} Hz"),
         ("cutting speed", f"{cut.tool_speed * tool.radius * 60:.6g} m/min"),
         ("feed speed", f"{cut.feed_speed * 6e4:.6g} mm/min"),
         ("resultant feed per tooth", _mm(cut.resultant_feed_speed / (turns * tool.teeth))),
-        ("engagement at the tip", f"{start:.4g} to {end:.4g} deg"),
     ]
