@@ -1,0 +1,138 @@
+"""What the integrator needs to know of an operation, as arrays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from turnmill_core.cutting.engagement import span_across_feed
+from turnmill_core.cutting.feed import feed_angle, feed_velocity
+from turnmill_core.machine.axes import AXES, AxisState
+from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool
+from turnmill_core.operation import Mode, Operation
+from turnmill_core.process import _kernels
+from turnmill_core.process.config import SimulationConfig
+from turnmill_core.process.sensors import CHANNELS, SoundModel, antialias_taps
+from turnmill_core.process.truth import principal_turns
+
+Floats = NDArray[np.float64]
+
+SPINDLE = AXES.index("s")
+LAG_PER_SLICE = 0.01
+MOST_SLICES = 32
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessModel:
+    """Operation and configuration as the integrator wants them.
+
+    dt [s]; modes (M, 16) and the surface's cells see _kernels; tooth_angle, pitch [rad], runout [m]
+    (teeth,); radius, bar_radius (0: a block) [m]; lag_per_depth [rad/m]; coefficients (6,): Ktc, Krc,
+    Kac [Pa], Kte, Kre, Kae [N/m]; taps: anti-alias filter; columns: of the raw signals, one per
+    channel; turns: tool revolutions in a principal period.
+    """
+
+    op: Operation
+    dt: float
+    modes: Floats
+    tooth_angle: Floats
+    pitch: Floats
+    runout: Floats
+    radius: float
+    bar_radius: float
+    lag_per_depth: float
+    coefficients: Floats
+    slices: int
+    cells: int
+    taps: Floats
+    columns: tuple[int, ...]
+    teeth: int
+    turns: int
+
+
+def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
+    """Arrays of `op` for the integrator."""
+    tool, material = op.tool, op.material
+    dt = 1.0 / (config.sample_rate * config.ratio)
+    pitch = np.array(tool.pitch)
+    lag_per_depth = 2 * math.tan(tool.helix_angle) / tool.diameter
+    depths = [op.conditions.depth, *(p.depth for p in op.schedule)]
+    lag = abs(lag_per_depth) * max(0.0, *depths)
+    speeds = [s for s in (op.conditions.tool_speed, *(p.tool_speed for p in op.schedule)) if s > 0]
+    return ProcessModel(
+        op=op, dt=dt, modes=_modes(op, config.sound, dt),
+        tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
+        runout=np.array(tool.runout or (0.0,) * tool.teeth), radius=tool.radius,
+        bar_radius=op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth=lag_per_depth,
+        coefficients=np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae]),
+        slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
+        cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
+        taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),
+        teeth=tool.teeth, turns=principal_turns(tool),
+    )
+
+
+def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
+    """One row of _kernels.advance's knots from an axis state: what the cut looks like at that instant."""
+    op = model.op
+    conditions = conditions_from_axes(op, axes)
+    depth = max(0.0, conditions.depth)
+    middle = np.array([depth / 2])
+    feed = feed_velocity(op, conditions, np.array([0.0, 1e-3]))
+    row = np.zeros(_kernels.KNOT_COLUMNS)
+    row[_kernels.TIME] = (axes.stamp_ns - base_ns) * 1e-9
+    row[_kernels.TOOL_ANGLE] = axes.position[SPINDLE]
+    row[_kernels.TOOL_SPEED] = conditions.tool_speed
+    if conditions.tool_speed > 0:
+        row[_kernels.SLIP] = abs(conditions.workpiece_speed) / conditions.tool_speed
+    row[_kernels.DEPTH] = conditions.depth
+    row[_kernels.FEED_X], row[_kernels.FEED_Y] = feed[0]
+    row[_kernels.FEED_X_SLOPE] = (feed[1, 0] - feed[0, 0]) / 1e-3
+    lower, upper = span_across_feed(op, conditions, middle)
+    epsilon = feed_angle(op, conditions, middle)
+    row[_kernels.START] = float(np.arccos(np.clip(upper / op.tool.radius, -1, 1))[0] - epsilon[0])
+    row[_kernels.EXIT] = float(np.arccos(np.clip(lower / op.tool.radius, -1, 1))[0] - epsilon[0])
+    return row
+
+
+def _modes(op: Operation, sound: SoundModel, dt: float) -> Floats:
+    """Rows of _kernels.advance's modes: tool, workpiece, then the panels that only radiate."""
+    rotation = machine_from_tool(op, op.conditions)
+    direction = np.array(sound.direction)
+    rows = []
+    for structure, side, area in ((op.tool.structure, 1.0, sound.tool_area),
+                                  (op.workpiece.structure, -1.0, sound.workpiece_area)):
+        turn = np.eye(3) if structure.frame == "tool" else rotation.T
+        for mode in structure.modes:
+            shape = turn @ np.array(mode.shape)
+            rows.append(_row(mode, side * shape, side, sound.radiation(area) * float(shape @ direction), dt))
+    for panel in sound.panels:
+        rows.append(_row(panel, np.array(panel.shape), 0.0, sound.radiation(sound.panel_area), dt))
+    return np.array(rows).reshape(-1, _kernels.MODE_COLUMNS)
+
+
+def _row(mode: Mode, shape: Floats, side: float, radiation: float, dt: float) -> Floats:
+    """Exact transition of q'' + 2 zeta w q' + w^2 q = f / m over dt, f linear in time.
+
+    From the exponential of the oscillator augmented with the force and its slope: the value at the
+    end is A (q, v) + B f(start) + C f(end).
+    """
+    w = 2 * math.pi * mode.frequency
+    system = np.zeros((4, 4))
+    system[0, 1] = 1.0
+    system[1, :3] = -(w**2), -2 * mode.damping * w, 1 / mode.mass
+    system[2, 3] = 1.0
+    flow = expm(system * dt)
+    row = np.zeros(_kernels.MODE_COLUMNS)
+    row[_kernels.A11], row[_kernels.A12], row[_kernels.A21], row[_kernels.A22] = flow[:2, :2].ravel()
+    row[_kernels.C1], row[_kernels.C2] = flow[:2, 3] / dt
+    row[_kernels.B1], row[_kernels.B2] = flow[:2, 2] - flow[:2, 3] / dt
+    row[_kernels.STIFFNESS], row[_kernels.DAMPING] = mode.stiffness, 2 * mode.damping * w * mode.mass
+    row[_kernels.INVERSE_MASS] = 1 / mode.mass
+    row[_kernels.SHAPE_X : _kernels.SHAPE_Z + 1] = shape
+    row[_kernels.SIDE], row[_kernels.RADIATION] = side, radiation
+    return row

@@ -1,0 +1,244 @@
+"""Time-domain simulation of the regenerative cut, with loss of contact (thesis 4.3.6.1, Eq. 4.121-4.129).
+
+Tool and workpiece vibrate in their modes; every tooth cuts the surface that all teeth before it left.
+The chip is h = max(0, n . r + runout - surface), r the displacement of the tool relative to the
+workpiece and the surface the outermost of everything that earlier teeth left there, moved on by the
+feed of each pass. The surface is stored by the angle of the material, so that speeds may change; the
+regeneration delay is the mean one, Td (1 + |Omega_c| / Omega_t) (Eq. 4.88, erratum D1).
+
+State in, state out: `simulate` is a loop over `step`, and however the axis states are cut into
+chunks, the same samples come out, bit by bit. See docs/model_process.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.controller import axis_state_at, schedule_duration
+from turnmill_core.monitoring.blocks import SensorBlock
+from turnmill_core.operation import Operation, require
+from turnmill_core.process import _kernels
+from turnmill_core.process.config import SimulationConfig
+from turnmill_core.process.model import ProcessModel, knot, process_model
+from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
+from turnmill_core.process.truth import MARKS_PER_TURN, Truth, truth_of_marks
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Chunk", "SimulationConfig", "SimulationState", "initial", "simulate", "step"]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationState:
+    """Everything that the next step needs; made by `initial`, returned by `step`, never changed.
+
+    steps: index of the last integration step; base_ns: stamp of step 0; knot: last axis state as the
+    integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (4,), surface
+    (teeth, slices, cells): see _kernels.advance; rows: raw signals that the anti-alias filter still
+    needs; next_sample: the sample that they centre on; samples: measured but not yet in a block;
+    next_block: index of the block's first sample; background: last value of the noise filter; marks:
+    displacements that the truth still needs, from the mark with index `mark_count` on.
+    """
+
+    model: ProcessModel
+    seed: int
+    steps: int
+    base_ns: int
+    knot: Floats
+    modal: Floats
+    force: Floats
+    scalars: Floats
+    surface: Floats
+    rows: Floats
+    next_sample: int
+    samples: NDArray[np.float32]
+    next_block: int
+    background: float
+    marks: Floats
+    first_mark_skip: int
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """What one step gave: the axis states it ran over, the blocks that became full, and the truth."""
+
+    axes: tuple[AxisState, ...]
+    blocks: tuple[SensorBlock, ...]
+    truth: Truth
+
+
+def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | None = None) -> SimulationState:
+    """State at rest before the first axis state.
+
+    seed: of all noise, >= 0; modal (M, 2): initial displacement [m] and velocity [m/s] of the modes,
+    tool modes first (None: at rest). Raises ``ValueError`` for a wrong shape or seed.
+    """
+    require(seed >= 0, "seed", seed, "", "an integer >= 0")
+    model = process_model(op, config)
+    count = len(model.modes)
+    start = np.zeros((count, 2))
+    if modal is not None:
+        require(np.shape(modal)[1:] == (2,) and np.shape(modal)[0] <= count, "modal state shape", np.shape(modal), "",
+                f"(at most {count}, 2)")
+        start[: len(modal)] = modal
+    surface = np.empty((op.tool.teeth, model.slices, model.cells))
+    surface[:] = model.runout[:, None, None]
+    half = len(model.taps) // 2
+    return SimulationState(
+        model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
+        force=np.zeros(3), scalars=np.zeros(4), surface=surface, rows=np.zeros((half, len(_kernels.RAW))),
+        next_sample=0, samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
+        marks=np.zeros((0, 4)), first_mark_skip=-1,
+    )
+
+
+def step(
+    config: SimulationConfig, state: SimulationState, axes: Sequence[AxisState],
+) -> tuple[SimulationState, Chunk]:
+    """Integrate over the axis states `axes`, which follow those of earlier steps.
+
+    The first axis state of all is time 0, and the first sample is taken there. Samples come out a
+    few milliseconds behind the axis states, because the anti-alias filter looks ahead; their stamps
+    are true. Raises ``ValueError`` when stamps do not ascend.
+    """
+    chunk = tuple(axes)
+    if not chunk:
+        return state, Chunk((), (), _no_truth())
+    base_ns = state.base_ns if len(state.knot) else chunk[0].stamp_ns
+    knots = np.concatenate([state.knot, *(knot(state.model, a, base_ns)[None, :] for a in chunk)])
+    stamps = knots[:, _kernels.TIME]
+    if np.any(np.diff(stamps) <= 0):
+        at = int(np.argmax(np.diff(stamps) <= 0))
+        raise ValueError(f"axis state stamp is {stamps[at + 1]} s after one at {stamps[at]} s, expected ascending stamps")
+    if not len(state.knot):
+        state = _begin(state, knots[0], base_ns)
+    return _finish_chunk(config, *_integrate(config, state, knots), chunk)
+
+
+def simulate(
+    op: Operation, config: SimulationConfig, seed: int, axes_at: Callable[[float, int], AxisState] | None = None,
+    duration: float | None = None,
+) -> Iterator[Chunk]:
+    """Chunks of one block each, until `duration` [s] (None: the schedule's).
+
+    axes_at: axis state for a time [s] and a stamp [ns] (None: the operation's schedule, by
+    controller.axis_state_at). The last chunks carry no axis states beyond the duration.
+    """
+    if axes_at is None:
+        def axes_at(time: float, stamp_ns: int) -> AxisState:
+            return axis_state_at(op, time, stamp_ns)
+    end = schedule_duration(op) if duration is None else duration
+    require(end > 0, "duration", end, "s", "a number > 0 (the operation has no schedule)")
+    blocks = int(end * config.sample_rate + 1e-6) // config.block_samples
+    state = initial(op, config, seed)
+    per_chunk = max(1, round(config.axes_rate * config.block_samples / config.sample_rate))
+    index = made = 0
+    while made < blocks:
+        times = [(index + i) / config.axes_rate for i in range(per_chunk)]
+        index += per_chunk
+        states = [axes_at(t, config.start_ns + round(t * 1e9)) for t in times]
+        state, chunk = step(config, state, states)
+        kept = chunk.blocks[: blocks - made]
+        made += len(kept)
+        shown = tuple(a for a, t in zip(chunk.axes, times, strict=True) if t <= end + 1e-9)
+        if shown or kept:
+            yield replace(chunk, axes=shown, blocks=kept)
+
+
+def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationState:
+    """State at the first axis state: angles set, one row of raw signals at time 0."""
+    scalars = np.array([first[_kernels.TOOL_ANGLE], 0.0, max(0.0, first[_kernels.DEPTH]), 0.0])
+    row = np.zeros((1, len(_kernels.RAW)))
+    row[0, 0] = first[_kernels.TOOL_ANGLE]
+    modes = state.model.modes
+    for side, column in ((1.0, 2), (-1.0, 5)):
+        chosen = modes[:, _kernels.SIDE] == side
+        shapes = side * modes[chosen][:, _kernels.SHAPE_X : _kernels.SHAPE_Z + 1]
+        row[0, column : column + 3] = state.modal[chosen, 0] @ shapes
+    period = MARKS_PER_TURN * state.model.turns
+    next_mark = math.floor(first[_kernels.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
+    return replace(state, base_ns=base_ns, scalars=scalars, rows=np.concatenate([state.rows, row]),
+                   first_mark_skip=-next_mark % period)
+
+
+def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) -> tuple[SimulationState, Floats]:
+    """Run the kernel to the last knot; the marks that it wrote."""
+    model = state.model
+    dt = model.dt
+    last = knots[-1, _kernels.TIME] + _kernels.TIME_TOLERANCE
+    end = int(last / dt) + 1
+    while end * dt > last:
+        end -= 1
+    count = max(0, end - state.steps) if len(knots) > 1 else 0
+    raw = np.empty((count, len(_kernels.RAW)))
+    turned = float(knots[:, _kernels.TOOL_ANGLE].max() - state.scalars[_kernels.ANGLE])
+    marks = np.empty((int(max(0.0, turned) * MARKS_PER_TURN / (2 * math.pi)) + count + 2, 4))
+    modal, force, scalars, surface = (a.copy() for a in (state.modal, state.force, state.scalars, state.surface))
+    written = 0
+    if count:
+        written = _kernels.advance(
+            state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.radius,
+            model.bar_radius, model.lag_per_depth, model.coefficients, modal, force, scalars, surface, raw,
+            MARKS_PER_TURN, marks,
+        )
+    advanced = replace(state, steps=state.steps + count, knot=knots[-1:], modal=modal, force=force, scalars=scalars,
+                       surface=surface, rows=np.concatenate([state.rows, raw]))
+    return advanced, marks[:written]
+
+
+def _finish_chunk(
+    config: SimulationConfig, state: SimulationState, marks: Floats, axes: tuple[AxisState, ...],
+) -> tuple[SimulationState, Chunk]:
+    """Measure, cut into blocks, and tell the truth."""
+    skipped = min(state.first_mark_skip, len(marks))
+    truth, rest = truth_of_marks(np.concatenate([state.marks, marks[skipped:]]), state.model.teeth, state.model.turns)
+    state = replace(state, marks=rest, first_mark_skip=state.first_mark_skip - skipped)
+    state = _measure(config, state)
+    size = config.block_samples
+    blocks = []
+    samples = state.samples
+    while len(samples) >= size:
+        first = state.next_block + len(blocks) * size
+        blocks.append(SensorBlock(
+            stamp_ns=state.base_ns + round(first * 1e9 / config.sample_rate), device=config.device,
+            stream_id=config.stream_id, first_sample=first, sample_rate=float(config.sample_rate),
+            channels=tuple(CHANNELS[name] for name in config.channels), samples=samples[:size].copy(),
+        ))
+        samples = samples[size:]
+    state = replace(state, samples=samples, next_block=state.next_block + len(blocks) * size)
+    return state, Chunk(axes, tuple(blocks), truth)
+
+
+def _measure(config: SimulationConfig, state: SimulationState) -> SimulationState:
+    """Filter and decimate all rows that the filter can reach, and add noise and ambient sound."""
+    model = state.model
+    ratio = config.ratio
+    width = len(model.taps)
+    count = max(0, (len(state.rows) - width) // ratio + 1)
+    if not count:
+        return state
+    used = np.ascontiguousarray(state.rows[: (count - 1) * ratio + width, model.columns])
+    signals = np.empty((count, len(model.columns)))
+    _kernels.decimate(used, model.taps, ratio, signals)
+    background = state.background
+    for c, name in enumerate(config.channels):
+        if name == "sound":
+            angle = state.rows[width // 2 :: ratio, 0][:count]
+            ambient, background = ambient_sound(config.sound, state.seed, state.next_sample, float(config.sample_rate),
+                                                angle, background)
+            signals[:, c] += ambient
+        else:
+            level = config.force_noise if name.startswith("force") else config.displacement_noise
+            signals[:, c] += level * white_noise(state.seed, 1 + list(CHANNELS).index(name), state.next_sample, count)
+    return replace(state, rows=state.rows[count * ratio :], next_sample=state.next_sample + count,
+                   background=background, samples=np.concatenate([state.samples, signals.astype(np.float32)]))
+
+
+def _no_truth() -> Truth:
+    return truth_of_marks(np.zeros((0, 4)), 1, 1)[0]

@@ -1,0 +1,146 @@
+"""What really happened in a simulated cut: synchronous and asynchronous amplitude without noise.
+
+The displacement of the tool relative to the workpiece, in the plane of the chip, is sampled at equal
+angles of the tool spindle while the equations of motion are integrated, so no speed has to be
+estimated. Over a window of PERIODS principal periods, and for each angle apart, a straight line
+is fitted through the values of successive periods:
+
+- synchronous amplitude: rms over the angle of the lines' values in the middle of the window, less
+  their mean (the static deflection);
+- asynchronous amplitude: rms of the residuals about the lines, with PERIODS - 2 degrees of freedom;
+- half-order amplitude: the part of the synchronous amplitude at odd multiples of half the tooth
+  passing frequency.
+
+x and y are added in squares. The principal period is one tool revolution, and two for an odd number
+of equally spaced teeth, where half the tooth passing frequency is not a multiple of the spindle's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.operation import Tool
+
+Floats = NDArray[np.float64]
+
+MARKS_PER_TURN = 240
+PERIODS = 8
+CROSSING = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Noise-free amplitudes at the middle of successive windows, one principal period apart.
+
+    time (n,) [s] since the first axis state; synchronous, asynchronous, half_order (n,) [m rms];
+    in_cut (n,): some chip is cut in every tool revolution of the window; touched (n,): some chip is
+    cut in the window.
+    """
+
+    time: Floats
+    synchronous: Floats
+    asynchronous: Floats
+    half_order: Floats
+    in_cut: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for name in ("time", "synchronous", "asynchronous", "half_order", "in_cut", "touched"):
+            array = getattr(self, name)
+            if array.shape != self.time.shape:
+                raise ValueError(f"truth {name} has shape {array.shape}, expected {self.time.shape}")
+            array.flags.writeable = False
+
+    @property
+    def ratio(self) -> Floats:
+        """Asynchronous over synchronous amplitude, NaN where the tool is not in the cut."""
+        ratio = np.full(self.time.shape, np.nan)
+        np.divide(self.asynchronous, self.synchronous, out=ratio, where=self.in_cut & (self.synchronous > 0))
+        return ratio
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Moment [s] when the asynchronous amplitude passes a share of the synchronous one, and which way."""
+
+    time: float
+    rising: bool
+
+
+def principal_turns(tool: Tool) -> int:
+    """Tool revolutions in one principal period: 2 for an odd number of equally spaced teeth, else 1."""
+    return 2 if tool.teeth % 2 and np.ptp(tool.pitch) < 1e-9 else 1
+
+
+def truth_of_marks(marks: Floats, teeth: int, turns: int) -> tuple[Truth, Floats]:
+    """Amplitudes of every full window in `marks`, and the marks that later windows need.
+
+    marks (n, 4): time [s], relative displacement x, y [m], largest chip [m] since the mark before,
+    at equal angles, MARKS_PER_TURN to the revolution, beginning at a principal period. turns: tool
+    revolutions in a principal period.
+    """
+    length = MARKS_PER_TURN * turns
+    periods = len(marks) // length
+    windows = max(0, periods - PERIODS + 1)
+    values = np.zeros((windows, 4))
+    in_cut = np.zeros(windows, dtype=np.bool_)
+    touched = np.zeros(windows, dtype=np.bool_)
+    for i in range(windows):
+        window = marks[i * length : (i + PERIODS) * length]
+        values[i] = _amplitudes(window, length, teeth * turns // 2 if (teeth * turns) % 2 == 0 else 0)
+        chips = window[:, 3].reshape(-1, MARKS_PER_TURN).max(axis=1)
+        in_cut[i] = bool(np.all(chips > 0))
+        touched[i] = bool(np.any(chips > 0))
+    truth = Truth(values[:, 0].copy(), values[:, 1].copy(), values[:, 2].copy(), values[:, 3].copy(), in_cut, touched)
+    return truth, marks[windows * length :].copy()
+
+
+def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float]:
+    """Middle time, synchronous, asynchronous and half-order amplitude of one window."""
+    values = window[:, 1:3].reshape(PERIODS, length, 2)
+    step = np.arange(PERIODS) - (PERIODS - 1) / 2
+    mean = values.mean(axis=0)
+    slope = np.tensordot(step, values, axes=(0, 0)) / np.sum(step**2)
+    residual = values - mean - step[:, None, None] * slope
+    synchronous = np.sqrt(np.sum(np.var(mean, axis=0)))
+    asynchronous = np.sqrt(np.sum(residual**2) / (length * (PERIODS - 2)))
+    half = 0.0
+    if half_order:
+        lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
+        half = float(np.sqrt(2 * np.sum(lines[half_order : length // 2 : 2 * half_order])))
+    middle = float(np.interp((len(window) - 1) / 2, np.arange(len(window)), window[:, 0]))
+    return middle, float(synchronous), float(asynchronous), half
+
+
+def join_truth(parts: Iterable[Truth]) -> Truth:
+    """One truth from successive parts."""
+    found = list(parts)
+    names = ("time", "synchronous", "asynchronous", "half_order", "in_cut", "touched")
+    if not found:
+        empty = np.zeros(0)
+        none = np.zeros(0, dtype=np.bool_)
+        return Truth(empty, empty.copy(), empty.copy(), empty.copy(), none, none.copy())
+    return Truth(*(np.concatenate([getattr(part, name) for part in found]) for name in names))
+
+
+def crossings(truth: Truth, share: float = CROSSING) -> tuple[Crossing, ...]:
+    """Moments when the asynchronous amplitude passes `share` of the synchronous one, while in the cut.
+
+    The ratio is interpolated linearly in its logarithm between windows. A move into or out of the
+    cut is no crossing.
+    """
+    ratio = truth.ratio
+    found = []
+    for i in range(1, len(ratio)):
+        before, after = ratio[i - 1], ratio[i]
+        if np.isnan(before) or np.isnan(after) or (before > share) == (after > share):
+            continue
+        low, high = np.log(max(before, 1e-12)), np.log(max(after, 1e-12))
+        part = (np.log(share) - low) / (high - low)
+        time = truth.time[i - 1] + part * (truth.time[i] - truth.time[i - 1])
+        found.append(Crossing(float(time), bool(after > before)))
+    return tuple(found)
