@@ -53,13 +53,13 @@ OPERATION = Topic(
     "operation", "turnmill_msgs/msg/Operation", "input", 1, 0.0,
     "operation file text and its sha256", durability="transient_local")
 CUTTING_LOADS = Topic(
-    "cutting_loads", "turnmill_msgs/msg/CuttingLoads", "output", 100, 25.0,
+    "cutting_loads", "turnmill_msgs/msg/CuttingLoads", "output", 100, 50.0,
     "predicted forces, torques and powers over one tool revolution")
 WRENCH_TOOL = Topic(
-    "wrench/tool", "geometry_msgs/msg/WrenchStamped", "output", 100, 25.0,
+    "wrench/tool", "geometry_msgs/msg/WrenchStamped", "output", 100, 50.0,
     "predicted mean force and torque on the tool, tool frame, in N and N m")
 WRENCH_MACHINE = Topic(
-    "wrench/machine", "geometry_msgs/msg/WrenchStamped", "output", 100, 25.0,
+    "wrench/machine", "geometry_msgs/msg/WrenchStamped", "output", 100, 50.0,
     "predicted mean force and torque on the tool, machine frame, in N and N m")
 CHATTER_STATE = Topic(
     "chatter_state", "turnmill_msgs/msg/ChatterState", "output", 100, 20.0,
@@ -90,9 +90,9 @@ PLOTS = (
     _plot("depth", 5.0, "StabilityMargin.depth, m"),
     _plot("depth_ratio", 5.0, "StabilityMargin.depth_ratio, 1"),
     _plot("spectral_radius", 5.0, "StabilityMargin.spectral_radius, 1"),
-    _plot("resultant_force", 25.0, "magnitude of CuttingLoads.force_tool_mean, N"),
-    _plot("tool_torque", 25.0, "CuttingLoads.tool_torque_mean, N m"),
-    _plot("tool_power", 25.0, "CuttingLoads.tool_power_mean, W"),
+    _plot("resultant_force", 50.0, "magnitude of CuttingLoads.force_tool_mean, N"),
+    _plot("tool_torque", 50.0, "CuttingLoads.tool_torque_mean, N m"),
+    _plot("tool_power", 50.0, "CuttingLoads.tool_power_mean, W"),
 )
 
 TOPICS = (
