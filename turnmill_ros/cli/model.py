@@ -43,7 +43,7 @@ def operation(
 ) -> None:
     """Check an operation file and print it back as a table.
 
-    Example: turnmill operation comak_case1
+    Example: turnmill operation thesis_table_4_9
     """
     if schema:
         typer.echo(json.dumps(operation_schema(), indent=2))
@@ -85,7 +85,7 @@ def forces(
 ) -> None:
     """Forces, torque and power of both spindles, chip load and cutting speed of a cut.
 
-    Example: turnmill forces comak_table_3_1 --report forces.html
+    Example: turnmill forces thesis_table_3_1 --report forces.html
     """
     op = find_operation(op_name, changes or ())
     cut = _cut(op, tool_speed, workpiece_speed, depth)
@@ -136,7 +136,7 @@ def stability(
 ) -> None:
     """Is this cut stable, by how much, and of what kind would the chatter be.
 
-    Example: turnmill stability comak_case1 --tool-speed 3350rpm --workpiece-speed 6rpm --depth 1.2mm
+    Example: turnmill stability thesis_table_4_9 --tool-speed 3350rpm --workpiece-speed 6rpm --depth 1.2mm
     """
     op = find_operation(op_name, changes or ())
     cut = _cut(op, tool_speed, workpiece_speed, depth)
