@@ -78,7 +78,7 @@ def _expected(node: dict[str, Any]) -> str:
 def first_error(file: str, error: ValidationError, data: dict[str, Any]) -> OperationError:
     """The most telling of pydantic's errors: unknown keys (often a typing error) before the others."""
     errors = error.errors(include_url=False)
-    chosen = min(errors, key=lambda e: e["type"] != "extra_forbidden")
+    chosen = min(errors, key=lambda e: e["type"] not in ("extra_forbidden", "invalid_key"))
     more = "" if len(errors) == 1 else f" (and {len(errors) - 1} more)"
     kind, where = chosen["type"], chosen["loc"]
     if kind in ("union_tag_not_found", "union_tag_invalid"):

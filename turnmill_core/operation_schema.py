@@ -86,6 +86,8 @@ class ModeSection(_Section):
     def _one_shape(self) -> ModeSection:
         if (self.direction is None) == (self.shape is None):
             raise PydanticCustomError("cross", "either direction (x, y or z) or shape (three numbers)")
+        if self.shape is not None and not any(self.shape):
+            raise PydanticCustomError("cross", "a mode shape that is not all zero")
         if self.damping >= 1:
             raise PydanticCustomError("cross", "a damping ratio below 100 %")
         return self
