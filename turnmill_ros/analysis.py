@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operation, finish, initial, update
+from turnmill_core.monitoring.chatter import ChatterConfig
 from turnmill_core.monitoring.verdict import ChatterKind, Verdict
 from turnmill_core.operation import Operation
 from turnmill_ros.monitor_feed import open_feed
@@ -59,24 +59,19 @@ def analyze(path: Path, operation: Operation | None = None, progress: Callable[[
     Raises InputError for a bag that cannot be trusted, naming file and reason.
     """
     feed = open_feed(path, operation)
-    config = feed.config
-    state, verdicts = initial(config), []
-    for item, share in feed.items():
-        state, new = update(config, state, item)
+    verdicts: list[Verdict] = []
+    for new, share in feed.verdicts():
         verdicts.extend(new)
         if progress is not None:
             progress(share)
-    state, new = finish(config, state)
-    verdicts.extend(new)
-    return Analysis(path, feed.operation, config, feed.start_ns, feed.end_ns, tuple(verdicts),
-                    merge(verdicts), feed.counts)
-
-
-def analysis_of(path: Path, verdicts: Sequence[Verdict]) -> Analysis:
-    """The analysis that holds given verdicts, as a run of the nodes gave them, on the bag that was recorded with them."""
-    feed = open_feed(path, None)
     return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts),
-                    feed.counts)
+                    dict(feed.counts))
+
+
+def analysis_of(path: Path, verdicts: Sequence[Verdict], counts: dict[str, int]) -> Analysis:
+    """The analysis that holds given verdicts, as a run of the nodes gave them, on the bag that was recorded with them."""
+    feed = open_feed(path)
+    return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts), counts)
 
 
 def merge(verdicts: Iterable[Verdict]) -> tuple[Segment, ...]:

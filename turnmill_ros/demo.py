@@ -9,7 +9,7 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -40,7 +40,7 @@ class Change:
         return abs(self.verdict_s - self.truth_s) <= TOLERANCE_S
 
 
-def changes(analysis: Analysis, truth: dict[str, list[float]]) -> list[Change]:
+def changes(analysis: Analysis, truth: dict[str, Any]) -> list[Change]:
     """Changes of the timeline beside the truth: entry into the cut, and each passing of the 20 % line.
 
     Raises InputError where the timeline is not air, stable, Hopf, stable.
@@ -50,7 +50,11 @@ def changes(analysis: Analysis, truth: dict[str, list[float]]) -> list[Change]:
     if states != EXPECTED:
         raise InputError("the timeline is " + ", ".join(s.state.name for s in seen),
                          expected=", ".join(k.name for k in EXPECTED))
-    moments = [truth["cut_entered_s"][0], truth["chatter_begins_s"][0], truth["chatter_ends_s"][0]]
+    moments = [
+        next(t for t, touched in zip(truth["time_s"], truth["touched"], strict=True) if touched),
+        next(c["t_s"] for c in truth["crossings"] if c["rising"]),
+        next(c["t_s"] for c in truth["crossings"] if not c["rising"]),
+    ]
     names = ("enters the cut", "chatter begins", "chatter is gone")
     return [Change(n, t, analysis.seconds(s.start_ns)) for n, t, s in zip(names, moments, seen[1:], strict=False)]
 
@@ -63,8 +67,8 @@ def run(bag: Path, folder: Path) -> None:
         path.unlink(missing_ok=True)
     began = time.monotonic()
     console.print(f"replaying {bag} through ROS 2 nodes ...", soft_wrap=True)
-    result = replay(bag, rate=float("inf"), output=recorded)
-    analysis = analysis_of(recorded, result.verdicts)
+    result = replay(bag, rate=0.0, out=recorded)
+    analysis = analysis_of(recorded, result.verdicts, result.counts)
     show_analysis(analysis)
     truth_path = bag.with_name(bag.name.removesuffix(".mcap") + ".truth.json")
     truth = json.loads(truth_path.read_text(encoding="utf-8"))

@@ -49,7 +49,7 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
             picture.times, picture.frequencies, picture.level_db, f"Spectrogram of {_named(picture.channel)}",
             picture.channel.unit, x_range, chatter, passing)))
     config = analysis.config
-    plots.append(("", figures.ratios(analysis.verdicts, start, config.enter, config.leave, x_range)))
+    plots.append(("", figures.ratios(analysis.verdicts, start, config.enter_ratio, config.leave_ratio, x_range)))
     if predictions is not None:
         plots += [("Predicted along the way" if k == 0 else "", p) for k, p in enumerate(predictions.plots(start, x_range))]
     plots += _spectra(analysis, channel)

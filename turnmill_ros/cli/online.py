@@ -48,8 +48,9 @@ def _need_ros() -> None:
 
 
 def _rate(text: str) -> float:
+    """Replay rate; 0 is the maximum."""
     if text == "max":
-        return math.inf
+        return 0.0
     try:
         rate = float(text)
     except ValueError:
@@ -87,8 +88,8 @@ def replay(
             new_file(path)
     with tempfile.TemporaryDirectory(prefix="turnmill-") as folder:
         out = output or Path(folder) / "replay.mcap"
-        result = run_replay(bag, operation=operation, rate=speed, output=out, separate_processes=separate)
-        analysis = analysis_of(out, result.verdicts)
+        result = run_replay(bag, operation, speed, out, separate_processes=separate)
+        analysis = analysis_of(out, result.verdicts, result.counts)
         if report is not None:
             from turnmill_ros.predictions import read_predictions
             from turnmill_ros.report import recording_report
@@ -122,20 +123,19 @@ def live(
         new_file(output)
     with tempfile.TemporaryDirectory(prefix="turnmill-") as folder:
         out = output or Path(folder) / "live.mcap"
-        result = run_live(operation, duration=quantity(duration, "s", "--duration"), separate_processes=separate,
-                          output=out, sample_rate=quantity(sample_rate, "Hz", "--sample-rate"), channels=channels, seed=seed)
-        _show_run(result, analysis_of(out, result.verdicts), output, None, as_json)
+        result = run_live(operation, duration=quantity(duration, "s", "--duration"), bag=out, separate_processes=separate,
+                          sample_rate=quantity(sample_rate, "Hz", "--sample-rate"), channels=channels, seed=seed)
+        _show_run(result, analysis_of(out, result.verdicts, result.counts), output, None, as_json)
 
 
 def _show_run(result: Any, analysis: Any, output: Path | None, report: Path | None, as_json: bool) -> None:
-    counts = {"sent": result.sent, "received": result.received, "judged": result.judged, "recorded": result.recorded}
     if as_json:
         from turnmill_ros.analysis import analysis_json
 
-        print_json({**analysis_json(analysis), "blocks": counts, "output": output and str(output)}, indent=None)
+        print_json({**analysis_json(analysis), "blocks": result.counts, "output": output and str(output)}, indent=None)
         return
     show_analysis(analysis)
-    console.print("sensor blocks: " + ", ".join(f"{v} {k}" for k, v in counts.items()))
+    console.print("sensor blocks: " + ", ".join(f"{v} {k}" for k, v in result.counts.items()))
     for name, path in (("recorded", output), ("report", report)):
         if path is not None:
             console.print(f"{name}: {path}", soft_wrap=True)

@@ -160,8 +160,8 @@ def recover(
         output = bag.with_name(bag.name.removesuffix(".part").removesuffix(".mcap") + ".recovered.mcap")
     new_file(output)
     done = recover_bag(bag, output)
-    report = {"bag": str(output), "messages": done.messages, "complete": done.complete, "lost": done.lost,
-              "duration_s": done.duration}
+    report = {"bag": str(output), "messages": done.messages, "duration_s": done.duration, "complete": done.complete,
+              "lost": done.lost}
     if as_json:
         print_json(report)
     else:
