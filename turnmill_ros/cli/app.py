@@ -10,11 +10,13 @@ import sys
 from collections.abc import Callable
 
 import typer
-from click.exceptions import ClickException
 from rich.console import Console
 
 from turnmill_ros.cli import model, online, recordings
 from turnmill_ros.errors import InputError
+
+# The base of typer's usage errors; newer ones carry their own click.
+ClickException = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
 
 app = typer.Typer(
     name="turnmill",
