@@ -88,7 +88,7 @@ def test_the_core_has_the_same_numbers() -> None:
     assert {r.name: int(r) for r in Reason} == constants("ChatterState", "REASON_")
     assert {s.name: int(s) for s in SpeedSource} == constants("ChatterState", "SPEED_")
     assert {t.name: int(t) for t in PredictedType} == constants("StabilityMargin", "TYPE_")
-    assert {s.name: int(s) for s in Status} == constants("SensorChannel", "STATUS_")
+    assert {name: int(s) for name, s in Status.__members__.items()} == constants("SensorChannel", "STATUS_")
 
 
 def share() -> Path:

@@ -25,7 +25,7 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 QUANTITY = re.compile(r"\b(float|complex|NDArray|ArrayLike|Arrays?|Floats|Complexes|Vector|Matrix)\b")
 MESSAGES = Path(__file__).resolve().parent.parent / "msg_schemas" / "turnmill_msgs" / "msg"
 MESSAGE = re.compile(r"turnmill_msgs/(\w+)")
-ENTRY = re.compile(r"^\s*`?([a-z_]\w*)`?(?:, `?[a-z_]\w*`?)*(?: \[[^\]]*\])?: ", re.M)
+ENTRY = re.compile(r"(?:\A|(?<=\n\n)|(?<=[.:;]\n))\s*`?([a-z_]\w*)`?(?:, `?[a-z_]\w*`?)*(?: \[[^\]]*\])?: ")
 BACKTICKS = re.compile(r"(?<!`)(?<!:)`([A-Za-z_]\w*)`(?!`)")
 WORDS = {"example", "examples", "errors", "source", "sources", "note", "notes", "where", "with", "and", "or"}
 
@@ -51,9 +51,12 @@ def names_known(tree: ast.AST) -> set[str]:
             value = getattr(node, attribute, None)
             if isinstance(value, str):
                 known.add(value)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            known.add(node.value)
     return known
+
+
+def strings(tree: ast.AST) -> set[str]:
+    """String constants of a module: values such as "exact" of a Literal."""
+    return {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
 
 
 def message_fields(text: str) -> set[str]:
@@ -75,11 +78,11 @@ def mentioned(name: str, text: str) -> bool:
 class Checker:
     """Collects what is wrong in one file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, values: set[str]) -> None:
         self.path, self.found = path, list[str]()
         text = path.read_text(encoding="utf-8")
         self.lines, self.tree = text.splitlines(), ast.parse(text)
-        self.known = names_known(self.tree)
+        self.known = names_known(self.tree) | values
 
     def say(self, line: int, text: str) -> None:
         """Note a finding."""
@@ -159,7 +162,8 @@ def main() -> None:
     files = list(sources(sys.argv[1:]))
     if not files:
         sys.exit("check_docstrings: no Python files; name a folder")
-    found = [finding for path in files for finding in Checker(path).run()]
+    values = set().union(*(strings(ast.parse(path.read_text(encoding="utf-8"))) for path in files))
+    found = [finding for path in files for finding in Checker(path, values).run()]
     for finding in found:
         print(finding)
     print(f"check_docstrings: {len(files)} files, {len(found)} findings")
