@@ -127,7 +127,7 @@ def recorded_name(name: str) -> str:
 
 
 def topic_table() -> str:
-    """The table as Markdown, for docs/nodes.md."""
+    """The table as Markdown, for docs/topics.md."""
     rows = ["| topic | type | direction | rate | QoS | content |", "|---|---|---|---|---|---|"]
     for t in TOPICS:
         rate = f"{t.rate:g} Hz" if t.rate else "on change"
