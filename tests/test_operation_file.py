@@ -149,6 +149,7 @@ BAD = [
     (("tool:\n", "tool: 5\nother:\n"), "other", ["not a known key"]),
     (("\nname:", "\nname: x\nnam:"), "nam", ["not a known key", "did you mean name"]),
     (("\nname:", "\nname: x\nno:"), "key False", ["not a text"]),
+    (("schema: 1", 'schema: 1\n"a\\e[2J b": 8'), "'a\\x1b[2J b'", ["not a known key"]),
     (("schema: 1", "schema: 1\n7: 8"), "key 7", ["not a text"]),
     (("  teeth: 2", "  teeth: 2\n  teeth: 3"), "", ["line", "'teeth' stands twice"]),
     (("machine: Mori", "machine: *s # Mori"), "", ["aliases"]),

@@ -38,7 +38,10 @@ def key_path(parts: tuple[str | int, ...]) -> str:
     """("tool", "modes", 1, "mass") -> "tool.modes[1].mass"."""
     path = ""
     for part in parts:
-        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else part
+        if isinstance(part, int):
+            path += f"[{part}]"
+        else:
+            path += ("." if path else "") + (part if part.isidentifier() else shown(part))
     return path
 
 

@@ -28,8 +28,8 @@ turn of the feed out of +x_M up to which it counts as a feed along +x_M."""
 STANDSTILL = 0.1
 """Speed [rad/s] below which a tool spindle that reads backwards counts as standing (1 rpm, encoder noise)."""
 
-STANDING_FEED = 1e-6
-"""Feed [m/s] below which a linear axis counts as standing (0.06 mm/min)."""
+STANDING_FEED = 1e-7
+"""Feed [m/s] below which a linear axis counts as standing (0.006 mm/min)."""
 
 _REL = 1e-9
 
