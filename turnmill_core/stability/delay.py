@@ -35,15 +35,17 @@ def tooth_period(pitch: ArrayLike, tool_speed: float) -> NDArray[np.float64]:
 def mean_delay(pitch: ArrayLike, tool_speed: float, workpiece_speed: float) -> NDArray[np.float64]:
     """Mean delay [s] of each tooth, Td (1 + |Omega_c| / Omega_t) (mean of Eq. 4.88, erratum D1).
 
-    pitch [rad]: angle to the preceding tooth; speeds in rad/s. The limit without workpiece rotation
-    is the tooth period of milling.
+    pitch [rad]: angle to the preceding tooth; tool_speed, workpiece_speed [rad/s]. The limit without
+    workpiece rotation is the tooth period of milling.
     """
     return tooth_period(pitch, tool_speed) * (1.0 + abs(workpiece_speed) / tool_speed)
 
 
 def delay_variation(tool_radius: float, tool_speed: float, surface_speed: float) -> float:
-    """Ratio v / (R_t Omega_t) [1] of surface speed [m/s] and cutting speed; first-principles delay is
-    Td (1 - ratio cos(phi)) (erratum D3)."""
+    """Ratio v / (R_t Omega_t) [1] in the first-principles delay Td (1 - ratio cos(phi)) (erratum D3).
+
+    tool_radius R_t [m], tool_speed Omega_t [rad/s], surface_speed v [m/s].
+    """
     _check(tool_speed)
     if not tool_radius > 0:
         raise ValueError(f"tool radius is {tool_radius} m, expected > 0")

@@ -77,7 +77,7 @@ def classify(multipliers: ArrayLike) -> PredictedType:
 def chatter_family(multiplier: complex, period: float, highest: float) -> Floats:
     """All chatter frequencies [Hz] up to `highest` [Hz] of a multiplier: |arg(mu) + 2 pi q| / (2 pi T), ascending.
 
-    (Eq. 4.107 and, for a negative real multiplier, Eq. 4.108.)
+    period T [s]. Eq. 4.107 and, for a negative real multiplier, Eq. 4.108.
     """
     base = float(np.angle(multiplier)) / (2 * np.pi)
     q = np.arange(-int(highest * period) - 2, int(highest * period) + 3)
@@ -113,7 +113,10 @@ def spectrum_lines(
 
 
 def verdict(multipliers: ArrayLike, leading_displacement: Complexes, period: float, keep: int = 6) -> FloquetVerdict:
-    """Full verdict from all multipliers and the leading eigenvector's displacement (k, 3) over one period."""
+    """Verdict from all multipliers and leading_displacement (k, 3), the leading eigenvector over one `period` [s].
+
+    keep: number of multipliers in the verdict.
+    """
     mu = np.asarray(multipliers, dtype=np.complex128)
     kind = classify(mu)
     order = np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))

@@ -61,7 +61,8 @@ class Margin:
     tool_speed, workpiece_speed [rad/s]; depth, depth_limit, depth_searched [m]; stable_depths (n, 2)
     [m]: stable intervals up to depth_searched; depth_ratio [1]; nearest_stable_speed [rad/s], NaN
     where none was found; limit_type and limit_frequency [Hz]: what the chatter just above the depth
-    limit would be. The other fields are those of StabilityPoint.
+    limit would be. spectral_radius, multipliers, predicted_type, chatter_frequency, principal_period
+    and delay: as in StabilityPoint.
     """
 
     tool_speed: float
@@ -272,7 +273,7 @@ def stability_lobes(
 
 
 def lowest_limit(depths: Floats, spectral_radius: Floats) -> Floats:
-    """Depth [m] at which the spectral radius (m, n) first passes 1 in each column, else the largest depth."""
+    """Depth [m] at which the spectral radius (m, n) first passes 1 in each column, else the largest of `depths`."""
     limit = np.full(spectral_radius.shape[1], depths[-1])
     for j, column in enumerate(spectral_radius.T):
         unstable = np.flatnonzero(column >= 1)

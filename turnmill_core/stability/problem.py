@@ -58,7 +58,7 @@ class Engagement:
 
 
 def constant_engagement(depth: float, start: float, exit: float) -> Engagement:
-    """Engagement with the same angles [rad] at every height up to `depth` [m]."""
+    """Engagement from `start` to `exit` [rad] at every height up to `depth` [m]."""
     return Engagement(np.array([0.0, depth]), np.full(2, start), np.full(2, exit))
 
 
@@ -126,7 +126,7 @@ def contact_basis(structure: LinearStructure) -> Floats:
         raise ValueError("no mode moves the tool across its axis, expected a mode shape with an x or y component")
     if rank == 2:
         return np.eye(2)
-    return u[:, :1] * np.sign(u[np.argmax(np.abs(u[:, 0])), 0])
+    return np.asarray(u[:, :1] * np.sign(u[np.argmax(np.abs(u[:, 0])), 0]), dtype=np.float64)
 
 
 def directional_matrix(problem: StabilityProblem, angle: ArrayLike) -> Floats:
