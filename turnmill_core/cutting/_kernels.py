@@ -1,0 +1,148 @@
+"""Loops that the profiler blamed: forces over a tool revolution, element by element.
+
+Each has a plain numpy twin in forces.py that gives the same numbers to round-off. Arguments and
+results are arrays in SI; shapes: n angles, N teeth, m heights, K predecessors.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def static_forces(
+    count: int, offset: Array, radius: Array, lag: Array, start: Array, stop: Array, feed: Array, delay: Array,
+    step: Array, width: Array, length: Array, coefficients: Array, lever: Array, result: Array,
+) -> float:
+    """Add forces (x, y, z), tool torque and workpiece torque of the static chip to `result` (count, 5).
+
+    Each of the `count` angles stands for the cell around it; a cell that the cut enters or leaves
+    counts with its share, evaluated at the middle of that share. Returns the largest chip [m].
+    """
+    cell = 2 * math.pi / count
+    sine, cosine = np.empty(count), np.empty(count)
+    for i in range(count):
+        sine[i], cosine[i] = math.sin(i * cell), math.cos(i * cell)
+    ktc, krc, kac, kte, kre, kae = coefficients
+    largest = 0.0
+    for j in range(offset.size):
+        for k in range(lag.size):
+            base = offset[j] - lag[k]
+            sin_base, cos_base = math.sin(base), math.cos(base)
+            fx, fy = feed[k, 0], feed[k, 1]
+            edge_t, edge_r, edge_a = kte * length[k], kre * length[k], kae * length[k]
+            for arc in range(start.shape[1]):
+                if stop[k, arc] <= start[k, arc]:
+                    continue
+                low, high = start[k, arc] - base, stop[k, arc] - base
+                first = math.floor(low / cell + 0.5)
+                last = math.ceil(high / cell - 0.5)
+                row = first % count
+                for i in range(first, last + 1):
+                    middle = i * cell
+                    left, right = max(middle - cell / 2, low), min(middle + cell / 2, high)
+                    if right > left:
+                        if i in (first, last):
+                            share = (right - left) / cell
+                            s, c = math.sin((left + right) / 2 + base), math.cos((left + right) / 2 + base)
+                        else:
+                            share = 1.0
+                            s = sine[row] * cos_base + cosine[row] * sin_base
+                            c = cosine[row] * cos_base - sine[row] * sin_base
+                        along = fx * s + fy * c
+                        h = along * delay[j, 0] + step[j, 0]
+                        for p in range(1, delay.shape[1]):
+                            h = min(h, along * delay[j, p] + step[j, p])
+                        if h > 0.0:
+                            largest = max(largest, h)
+                            area = h * width[k]
+                            ft = share * (ktc * area + edge_t)
+                            fr = share * (krc * area + edge_r)
+                            fa = share * (kac * area + edge_a)
+                            x = -fr * s - ft * c
+                            result[row, 0] += x
+                            result[row, 1] += -fr * c + ft * s
+                            result[row, 2] -= fa
+                            result[row, 3] += radius[j] * ft
+                            result[row, 4] -= lever[k] * x + radius[j] * s * fa
+                    row += 1
+                    if row == count:
+                        row = 0
+    return largest
+
+
+@njit(cache=True)
+def exact_forces(
+    count: int, offset: Array, radius: Array, tool_radius: float, lag: Array, feed: Array, sense: float, lead: float,
+    lower: float, upper: float, half_width: Array, tooth_lag: Array, step: Array, tool_speed: float, width: Array,
+    length: Array, coefficients: Array, lever: Array, result: Array,
+) -> float:
+    """Add forces (x, y, z), tool torque and workpiece torque of the exact chip to `result` (count, 5).
+
+    Evaluated at the angles themselves. Returns the largest chip [m].
+    """
+    cell = 2 * math.pi / count
+    sine, cosine = np.empty(count), np.empty(count)
+    for i in range(count):
+        sine[i], cosine[i] = math.sin(i * cell), math.cos(i * cell)
+    ktc, krc, kac, kte, kre, kae = coefficients
+    largest = 0.0
+    for j in range(offset.size):
+        for k in range(lag.size):
+            base = offset[j] - lag[k]
+            sin_base, cos_base = math.sin(base), math.cos(base)
+            fx, fy = feed[k, 0], feed[k, 1]
+            for i in range(count):
+                s = sine[i] * cos_base + cosine[i] * sin_base
+                c = cosine[i] * cos_base - sine[i] * sin_base
+                # material inside the bar and between the walls
+                inner, outer = 0.0, radius[j]
+                if s != 0.0:
+                    outer = min(outer, half_width[k] / abs(s))
+                x = radius[j] * s
+                square = lever[k] * lever[k] + x * x
+                place = (sense * radius[j] * c - lead * math.atan2(x, lever[k])
+                         - tool_radius * (math.sqrt(1.0 + lead * lead / square) - 1.0))
+                slope = sense * c - lead * s * lever[k] / square
+                if slope != 0.0:
+                    if lower > -math.inf:
+                        bound = radius[j] - (place - lower) / slope
+                        if slope > 0.0:
+                            inner = max(inner, bound)
+                        else:
+                            outer = min(outer, bound)
+                    if upper < math.inf:
+                        bound = radius[j] - (place - upper) / slope
+                        if slope < 0.0:
+                            inner = max(inner, bound)
+                        else:
+                            outer = min(outer, bound)
+                along, across = fx * s + fy * c, fx * c - fy * s
+                for p in range(tooth_lag.shape[1]):
+                    if outer <= inner:
+                        break
+                    r = radius[j] - step[j, p]
+                    tau = tooth_lag[j, p] / tool_speed
+                    for _ in range(4):
+                        delta = tooth_lag[j, p] - tool_speed * tau
+                        tau += (r * math.sin(delta) - tau * across) / (tool_speed * r * math.cos(delta) + across)
+                    inner = max(inner, r * math.cos(tooth_lag[j, p] - tool_speed * tau) - tau * along)
+                h = outer - inner
+                if h > 0.0:
+                    largest = max(largest, h)
+                    ft = ktc * h * width[k] + kte * length[k]
+                    fr = krc * h * width[k] + kre * length[k]
+                    fa = kac * h * width[k] + kae * length[k]
+                    force = -fr * s - ft * c
+                    result[i, 0] += force
+                    result[i, 1] += -fr * c + ft * s
+                    result[i, 2] -= fa
+                    result[i, 3] += radius[j] * ft
+                    result[i, 4] -= lever[k] * force + radius[j] * s * fa
+    return largest

@@ -1,0 +1,159 @@
+"""Uncut chip thickness of a rigid cut (thesis Eq. 3.44, erratum M6), and the speeds that bound it.
+
+`static` is the projection of the feed vector on the tooth's normal. `exact` measures, along the
+tooth's normal, the material that is really there: between the trochoid of the tooth and those of
+the teeth before it, the wall left by the previous workpiece revolution, and the surface of the bar.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from turnmill_core.cutting.engagement import (
+    Engagement,
+    axial_place,
+    engagement,
+    helix_lead,
+    lever_arm,
+    material_half_width,
+    walls,
+)
+from turnmill_core.cutting.feed import cross_feed_sense, feed_velocity
+from turnmill_core.cutting.tool import Array, EdgeElements, edge_elements, predecessors, read_only
+from turnmill_core.operation import Conditions, Operation
+
+ChipModel = Literal["static", "exact"]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Everything by height that the chip of one instant needs; m heights, N teeth.
+
+    elements: the edges; engagement: arcs of the `static` chip; feed [m/s] (m, 2), tool relative to
+    material in the tool frame; lever [m] (m,), distance of the height from the C axis; half_width
+    [m] (m,), largest |x_T| of material; sense: +1 up-milling, -1 down-milling; lead [m/rad] and
+    walls [m] (lower, upper) of the material as `axial_place` measures it, for the longest tooth;
+    lag [rad] (N, K) and delay [s] (N, K) since the k-th predecessor of each tooth passed; step [m]
+    (N, K), radius of the tooth minus that of the predecessor; tool_radius [m]; tool_speed [rad/s].
+    """
+
+    elements: EdgeElements
+    engagement: Engagement
+    feed: Array
+    lever: Array
+    half_width: Array
+    sense: float
+    lead: float
+    walls: tuple[float, float]
+    lag: Array
+    delay: Array
+    step: Array
+    tool_radius: float
+    tool_speed: float
+
+
+def prepare_cut(op: Operation, conditions: Conditions, elements: int = 64) -> Cut:
+    """Collect what the chip models need at one instant of the cut.
+
+    Raises:
+        ValueError: the conditions are not in cut, or the depth exceeds the flute length.
+    """
+    if not conditions.in_cut:
+        raise ValueError(f"depth is {conditions.depth!r} m, radial immersion {conditions.radial_immersion!r} m, tool "
+                         f"speed {conditions.tool_speed!r} rad/s, expected a cut (all > 0)")
+    edges = edge_elements(op.tool, conditions.depth, elements)
+    lower, upper = walls(op, conditions)
+    sense = cross_feed_sense(conditions)
+    if sense < 0:
+        lower, upper = -upper, -lower
+    if op.process == "turn-milling" and math.isinf(upper):
+        lower += float(edges.radius.max()) - op.tool.radius  # the longest tooth left the wall
+    angle, step = predecessors(op.tool)
+    return Cut(
+        elements=edges,
+        engagement=engagement(op, conditions, edges.height),
+        feed=read_only(feed_velocity(op, conditions, edges.height)),
+        lever=read_only(lever_arm(op, conditions, edges.height)),
+        half_width=read_only(material_half_width(op, conditions, edges.height)),
+        sense=sense,
+        lead=helix_lead(op, conditions),
+        walls=(lower, upper),
+        lag=angle,
+        delay=read_only(angle / conditions.tool_speed),
+        step=step,
+        tool_radius=op.tool.radius,
+        tool_speed=conditions.tool_speed,
+    )
+
+
+def static_chip(cut: Cut, phi: Array) -> Array:
+    """Chip thickness of Eq. 3.44 at the tooth angles `phi` [rad] (n, N, m), engagement not applied.
+
+    h_j = min over k of [(f . n) tau_jk + r_j - r_jk], with tau_jk the time since the k-th
+    predecessor of tooth j passed and r_j - r_jk the step of their radii; for equal pitch without
+    runout h = (f . n) / (N Omega_t) (erratum M6: the feed is a length per time). Never below 0.
+    """
+    normal_feed = cut.feed[:, 0] * np.sin(phi) + cut.feed[:, 1] * np.cos(phi)
+    chip = normal_feed[..., None] * cut.delay[:, None, :] + cut.step[:, None, :]
+    return np.asarray(np.maximum(chip.min(axis=-1), 0.0), dtype=np.float64)
+
+
+def exact_chip(cut: Cut, phi: Array) -> Array:
+    """Material along the tooth's normal [m] at the tooth angles `phi` [rad] (n, N, m), engagement included.
+
+    On the ray from the tool axis through the edge, material lies outside the trochoid of every
+    predecessor, inside the wall of the previous workpiece revolution and inside the bar. The radius
+    at which the predecessor k crossed the ray solves
+    r_jk sin(delta) = tau (f . e), delta = lag_jk - Omega_t tau, e the direction of motion of the edge,
+    which Newton's method finds to round-off. The feed is taken as straight over the lag (workpiece
+    rotation of a few mrad) and the wall as smooth.
+    """
+    sine, cosine = np.sin(phi), np.cos(phi)
+    along = cut.feed[:, 0] * sine + cut.feed[:, 1] * cosine
+    across = cut.feed[:, 0] * cosine - cut.feed[:, 1] * sine
+    own = cut.elements.radius[:, None]
+    inner = np.zeros(np.broadcast_shapes(phi.shape))
+    for k in range(cut.lag.shape[1]):
+        radius = (cut.elements.radius - cut.step[:, k])[:, None]
+        tau = np.broadcast_to(cut.delay[:, k, None], phi.shape)
+        for _ in range(4):
+            delta = cut.lag[:, k, None] - cut.tool_speed * tau
+            tau = tau + (radius * np.sin(delta) - tau * across) / (cut.tool_speed * radius * np.cos(delta) + across)
+        inner = np.maximum(inner, radius * np.cos(cut.lag[:, k, None] - cut.tool_speed * tau) - tau * along)
+    x = own * sine
+    outer = np.minimum(own, np.divide(cut.half_width, np.abs(sine), out=np.full(phi.shape, np.inf), where=sine != 0))
+    place = axial_place(cut.lead, cut.tool_radius, x, cut.sense * own * cosine, cut.lever)
+    slope = cut.sense * cosine - cut.lead * sine * cut.lever / (cut.lever**2 + x**2)
+    for wall, rising in ((cut.walls[0], slope > 0), (cut.walls[1], slope < 0)):
+        if math.isfinite(wall):
+            with np.errstate(divide="ignore"):
+                bound = own - (place - wall) / slope
+            inner = np.where(rising, np.maximum(inner, bound), inner)
+            outer = np.where(rising, outer, np.minimum(outer, bound))
+    return np.asarray(np.maximum(outer - inner, 0.0), dtype=np.float64)
+
+
+def feed_per_tooth(op: Operation, conditions: Conditions) -> float:
+    """Largest feed per tooth [m] of the bar's surface: hypot(pi D_w Omega_c, f_a Omega_c) / (N Omega_t), speeds in 1/s.
+
+    In milling the feed speed over N Omega_t. This is the chip that chapter 5 of the thesis limits;
+    the uncut chip itself is smaller by the sine of the exit angle.
+    """
+    if conditions.tool_speed == 0:
+        return 0.0
+    surface = conditions.workpiece_speed * op.workpiece.radius if op.process == "turn-milling" else 0.0
+    return math.hypot(surface, conditions.feed_speed) * 2 * math.pi / (op.tool.teeth * conditions.tool_speed)
+
+
+def tool_speed_for_feed_per_tooth(op: Operation, conditions: Conditions, limit: float) -> float:
+    """Lowest tool speed [rad/s] that keeps `feed_per_tooth` at or below `limit` [m] (thesis 5.2.1)."""
+    return feed_per_tooth(op, conditions) * conditions.tool_speed / limit
+
+
+def tool_speed_for_cutting_speed(op: Operation, limit: float) -> float:
+    """Highest tool speed [rad/s] whose peripheral speed is at or below `limit` [m/s] (thesis 5.2.5)."""
+    return limit / op.tool.radius

@@ -1,0 +1,125 @@
+"""Predicted loads of one instant of the cut: forces, torque and power of both spindles, chip, removal rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnmill_core.cutting.chip import ChipModel
+from turnmill_core.cutting.engagement import Engagement, engagement, removal
+from turnmill_core.cutting.forces import revolution
+from turnmill_core.cutting.tool import Array, middle_heights, read_only
+from turnmill_core.machine.conditions import machine_from_tool
+from turnmill_core.operation import Conditions, Operation
+
+
+@dataclass(frozen=True)
+class CuttingLoads:
+    """Rigid cutting loads over one revolution of the tool spindle; the fields of turnmill_msgs/CuttingLoads.
+
+    Forces [N] (3,) are those that the workpiece exerts on the tool, in the tool frame and in the
+    machine frame: mean, and peak, the value of largest magnitude of each component (signed).
+    Torques [N m] resist their spindle; powers [W]; chip_thickness_max [m]; cutting_speed [m/s],
+    peripheral speed of the tool; tooth_passing_frequency [Hz]; material_removal_rate [m3/s];
+    operation_hash, sha256 of the operation's text.
+
+    For pictures: angle [rad] (n,), force_tool [N] (n, 3), tool_torque [N m] (n,), workpiece_torque
+    [N m] (n,) over the revolution; engagement, the arcs by height; bottom_share [1], share of the
+    removed volume that enters through the tool's bottom and is not in the forces.
+    """
+
+    force_tool_mean: Array
+    force_tool_peak: Array
+    force_machine_mean: Array
+    force_machine_peak: Array
+    tool_torque_mean: float
+    tool_torque_peak: float
+    tool_power_mean: float
+    workpiece_torque_mean: float
+    workpiece_torque_peak: float
+    workpiece_power_mean: float
+    chip_thickness_max: float
+    cutting_speed: float
+    tooth_passing_frequency: float
+    material_removal_rate: float
+    in_cut: bool
+    operation_hash: str
+    angle: Array
+    force_tool: Array
+    tool_torque: Array
+    workpiece_torque: Array
+    engagement: Engagement
+    bottom_share: float
+
+
+def cutting_loads(
+    op: Operation, conditions: Conditions, angles: int = 360, elements: int = 64, chip: ChipModel = "static"
+) -> CuttingLoads:
+    """Loads over one tool revolution at `conditions`.
+
+    Without contact, without feed or with a tool at rest all loads are zero and in_cut is False.
+
+    Args:
+        op: the operation.
+        conditions: the instant of the cut.
+        angles: number of angles n of the revolution.
+        elements: number of axial elements m of the edges.
+        chip: `static` (Eq. 3.44) or `exact`.
+
+    Raises:
+        ValueError: the depth exceeds the flute length.
+    """
+    arcs = _arcs(op, conditions, elements)
+    in_cut = bool(arcs.angle.any())
+    if in_cut:
+        turn = revolution(op, conditions, angles, elements, chip)
+        angle, force, chip_max = turn.angle, turn.force_tool, turn.chip_thickness_max
+        tool_torque, workpiece_torque = turn.tool_torque, turn.workpiece_torque
+        volume = removal(op, conditions)
+        rate, bottom_share = volume.total, volume.bottom_share
+    else:
+        angle = read_only(np.arange(angles) * (2 * math.pi / angles))
+        force, chip_max = read_only(np.zeros((angles, 3))), 0.0
+        tool_torque = workpiece_torque = read_only(np.zeros(angles))
+        rate, bottom_share = 0.0, 0.0
+    force_machine = force @ machine_from_tool(op, conditions).T
+    tool_torque_mean, workpiece_torque_mean = float(tool_torque.mean()), float(workpiece_torque.mean())
+    return CuttingLoads(
+        force_tool_mean=read_only(force.mean(axis=0)),
+        force_tool_peak=read_only(_peak(force)),
+        force_machine_mean=read_only(force_machine.mean(axis=0)),
+        force_machine_peak=read_only(_peak(force_machine)),
+        tool_torque_mean=tool_torque_mean,
+        tool_torque_peak=float(_peak(tool_torque)),
+        tool_power_mean=tool_torque_mean * conditions.tool_speed,
+        workpiece_torque_mean=workpiece_torque_mean,
+        workpiece_torque_peak=float(_peak(workpiece_torque)),
+        workpiece_power_mean=workpiece_torque_mean * abs(conditions.workpiece_speed),
+        chip_thickness_max=chip_max,
+        cutting_speed=op.tool.radius * conditions.tool_speed,
+        tooth_passing_frequency=op.tool.teeth * conditions.tool_speed / (2 * math.pi),
+        material_removal_rate=rate,
+        in_cut=in_cut,
+        operation_hash=op.sha256,
+        angle=angle,
+        force_tool=force,
+        tool_torque=tool_torque,
+        workpiece_torque=workpiece_torque,
+        engagement=arcs,
+        bottom_share=bottom_share,
+    )
+
+
+def _arcs(op: Operation, conditions: Conditions, elements: int) -> Engagement:
+    """Arcs at the middle of each element; empty at the tip where there is no contact."""
+    if not conditions.in_cut:
+        return engagement(op, conditions, np.zeros(1))
+    return engagement(op, conditions, middle_heights(conditions.depth, elements))
+
+
+def _peak(values: Array) -> Array:
+    """The value of largest magnitude along the first axis, with its sign."""
+    index = np.abs(values).argmax(axis=0)
+    return np.asarray(np.take_along_axis(values, np.expand_dims(index, 0), axis=0)[0], dtype=np.float64)
