@@ -29,7 +29,8 @@ RAW = (
     "force_x", "force_y", "force_z",
 )
 # Entries of `scalars`, carried from step to step.
-ANGLE, PSI, LAST_DEPTH, CHIP = range(4)
+ANGLE, PSI, LAST_DEPTH, CHIP, NEXT_MARK = range(5)
+SCALARS = 5
 TIME_TOLERANCE = 0.5e-9
 
 
@@ -71,187 +72,224 @@ def _hermite(a: float, va: float, b: float, vb: float, h: float, u: float) -> fl
 
 
 @njit(cache=True)
+def _cut(
+    now: Floats, turned: float, psi: float, px: float, py: float, tooth_angle: Floats, pitch: Floats, runout: Floats,
+    shape: Floats, coefficients: Floats, surface: Floats, place: Floats, force: Floats,
+) -> float:
+    """Cutting force on the tool [N] (3,) for the displacement px, py [m]; returns the largest chip [m].
+
+    now: a row of knots at this instant; turned [rad]: tool angle of the step; psi [rad]: angle of the
+    tool in the material. place (teeth, slices, 4) receives what _leave_surface needs: sine and
+    cosine of the tooth's angle, middle height of the engaged part of the slice [m] (-1: no chip is
+    cut), and 1 near the cut, else 0. Entry and exit are averaged with a hat of one step's width,
+    which keeps impulse and moment of the force when an edge falls inside a step.
+    """
+    teeth, slices, cells = surface.shape
+    radius, bar_radius, lag_per_depth = shape
+    cell = 2.0 * math.pi / cells
+    depth = max(0.0, now[DEPTH])
+    start, leave = now[START], now[EXIT]
+    lag_step = lag_per_depth * depth / slices
+    lag_all = (slices - 1) * lag_step
+    margin = 4.0 * max(cell, turned) + 1.5 * pitch.max() * now[SLIP]
+    first = start - margin
+    cos_step, sin_step = math.cos(lag_step), math.sin(lag_step)
+    chip = 0.0
+    force[:] = 0.0
+    place[:, :, 3] = 0.0
+    for j in range(teeth):
+        period = pitch[j] / now[TOOL_SPEED]
+        ahead = j + 1 if j + 1 < teeth else 0
+        leading = now[TOOL_ANGLE] + tooth_angle[j] - 0.5 * lag_step + max(0.0, -lag_all)
+        leading -= 2.0 * math.pi * math.floor((leading - first) / (2.0 * math.pi))
+        if leading - abs(lag_all) > leave + margin:
+            continue
+        phi = leading - max(0.0, -lag_all) + lag_step
+        sin, cos = math.sin(phi), math.cos(phi)
+        for s in range(slices):
+            phi -= lag_step
+            sin, cos = sin * cos_step - cos * sin_step, cos * cos_step + sin * sin_step
+            if phi < first or phi > leave + margin:
+                continue
+            place[j, s, 0], place[j, s, 1], place[j, s, 2], place[j, s, 3] = sin, cos, -1.0, 1.0
+            weight = _ramp((phi - start) / turned) - _ramp((phi - leave) / turned)
+            if weight <= 0.0:
+                continue
+            low, high = depth * s / slices, depth * (s + 1) / slices
+            if bar_radius > 0.0:
+                reach = radius * sin
+                high = min(high, math.sqrt(max(0.0, bar_radius * bar_radius - reach * reach)) - bar_radius + depth)
+            width = weight * (high - low)
+            if width <= 0.0:
+                continue
+            height = 0.5 * (low + high)
+            place[j, s, 2] = height
+            feed = (now[FEED_X] + now[FEED_X_SLOPE] * height) * sin + now[FEED_Y] * cos
+            left = _cubic(surface[ahead, s], (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell)
+            h = runout[j] + px * sin + py * cos + feed * period - left
+            if h <= 0.0:
+                continue
+            chip = max(chip, h)
+            tangential = width * (coefficients[0] * h + coefficients[3])
+            radial = width * (coefficients[1] * h + coefficients[4])
+            force[0] -= radial * sin + tangential * cos
+            force[1] -= radial * cos - tangential * sin
+            force[2] -= width * (coefficients[2] * h + coefficients[5])
+    return chip
+
+
+@njit(cache=True)
+def _leave_surface(
+    now: Floats, turned: float, dt: float, psi0: float, psi1: float, depth0: float, motion: Floats,
+    tooth_angle: Floats, pitch: Floats, runout: Floats, lag_per_depth: float, place: Floats, surface: Floats,
+) -> None:
+    """Store the surface that each tooth leaves at every node of material angle passed in the step.
+
+    motion (2, 4): displacement x, y [m] and velocity x, y [m/s] at the beginning and the end of the
+    step; psi0, psi1 and depth0, now[DEPTH]: angle in the material and depth there. Where no chip is
+    due, the surface is taken to be where the edge is, so that material that comes into the cut looks
+    as if the tooth before had left it.
+    """
+    teeth, slices, cells = surface.shape
+    cell = 2.0 * math.pi / cells
+    lag0 = lag_per_depth * depth0 / slices
+    lag1 = lag_per_depth * max(0.0, now[DEPTH]) / slices
+    for j in range(teeth):
+        period = pitch[j] / now[TOOL_SPEED]
+        ahead = j + 1 if j + 1 < teeth else 0
+        for s in range(slices):
+            if place[j, s, 3] == 0.0:
+                continue
+            before = (psi0 + tooth_angle[j] - (s + 0.5) * lag0) / cell
+            after = (psi1 + tooth_angle[j] - (s + 0.5) * lag1) / cell
+            node = math.floor(before) + 1.0
+            while node <= after:
+                part = (node - before) / (after - before)
+                back = (1.0 - part) * turned
+                square = back * back
+                sin_back = back * (1.0 - square / 6.0 * (1.0 - square / 20.0))
+                cos_back = 1.0 - square / 2.0 * (1.0 - square / 12.0)
+                sin = place[j, s, 0] * cos_back - place[j, s, 1] * sin_back
+                cos = place[j, s, 1] * cos_back + place[j, s, 0] * sin_back
+                edge = (
+                    runout[j]
+                    + sin * _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
+                    + cos * _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
+                )
+                here = int(node) % cells
+                if place[j, s, 2] >= 0.0:
+                    feed = (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * sin + now[FEED_Y] * cos
+                    edge = max(edge, surface[ahead, s, here] - feed * period)
+                surface[j, s, here] = edge
+                node += 1.0
+
+
+@njit(cache=True)
+def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
+    """Relative displacement and velocity (4,) of the tool against the workpiece from the modal state."""
+    motion[:] = 0.0
+    for m in range(modes.shape[0]):
+        if modes[m, SIDE] != 0.0:
+            motion[0] += modes[m, SHAPE_X] * modal[m, 0]
+            motion[1] += modes[m, SHAPE_Y] * modal[m, 0]
+            motion[2] += modes[m, SHAPE_X] * modal[m, 1]
+            motion[3] += modes[m, SHAPE_Y] * modal[m, 1]
+
+
+@njit(cache=True)
 def advance(
     first: int, dt: float, knots: Floats, modes: Floats, tooth_angle: Floats, pitch: Floats, runout: Floats,
-    radius: float, bar_radius: float, lag_per_depth: float, coefficients: Floats, modal: Floats, force: Floats, scalars: Floats,
-    surface: Floats, raw: Floats, marks_per_turn: int, marks: Floats,
+    shape: Floats, coefficients: Floats, modal: Floats, force: Floats, scalars: Floats, surface: Floats, raw: Floats,
+    marks_per_turn: int, marks: Floats,
 ) -> int:
     """Integrate the cut over len(raw) steps of `dt`, from step index `first`; returns the marks written.
 
     knots (K, 10): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
-    (teeth,); radius of the tool and bar_radius (0: a block) [m]; lag_per_depth [rad/m]; coefficients Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m].
-    Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (4,),
-    surface (teeth, slices, cells) [m]. Written: raw (steps, 11), see RAW; marks (>= steps, 4): time,
-    relative displacement x, y, and largest chip since the last mark, at every 2 pi / marks_per_turn
-    of the tool angle.
+    (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m];
+    coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m].
+    Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
+    surface (teeth, slices, cells) [m]. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
+    displacement x, y, and largest chip since the last mark, at every 2 pi / marks_per_turn of the
+    tool angle.
     """
-    teeth, slices, cells = surface.shape
-    cell = 2.0 * math.pi / cells
     mark_angle = 2.0 * math.pi / marks_per_turn
-    longest_pitch = pitch.max()
-    predicted = np.empty((modes.shape[0], 2))
-    zone = np.zeros((teeth, slices), dtype=np.bool_)
-    wrapped = np.empty((teeth, slices))
-    height = np.full((teeth, slices), -1.0)  # middle of the engaged part of the slice, or -1
+    now = np.empty(knots.shape[1])
+    free = np.empty((modes.shape[0], 2))
+    motion = np.empty((2, 4))
+    place = np.zeros((surface.shape[0], surface.shape[1], 4))
+    _move(modes, modal, motion[1])
     written = 0
     k = 0
-    rx = ry = vx = vy = 0.0
-    for m in range(modes.shape[0]):
-        side = modes[m, SIDE]
-        rx += side * side * modes[m, SHAPE_X] * modal[m, 0]
-        ry += side * side * modes[m, SHAPE_Y] * modal[m, 0]
-        vx += side * side * modes[m, SHAPE_X] * modal[m, 1]
-        vy += side * side * modes[m, SHAPE_Y] * modal[m, 1]
     for i in range(raw.shape[0]):
         time = (first + i + 1) * dt
         while k + 2 < knots.shape[0] and time > knots[k + 1, TIME] + TIME_TOLERANCE:
             k += 1
         span = knots[k + 1, TIME] - knots[k, TIME]
         u = (time - knots[k, TIME]) / span
-        w = 1.0 - u
-        tool_speed = w * knots[k, TOOL_SPEED] + u * knots[k + 1, TOOL_SPEED]
-        slip = w * knots[k, SLIP] + u * knots[k + 1, SLIP]
-        depth = max(0.0, w * knots[k, DEPTH] + u * knots[k + 1, DEPTH])
-        feed_x = w * knots[k, FEED_X] + u * knots[k + 1, FEED_X]
-        feed_x_slope = w * knots[k, FEED_X_SLOPE] + u * knots[k + 1, FEED_X_SLOPE]
-        feed_y = w * knots[k, FEED_Y] + u * knots[k + 1, FEED_Y]
-        start = w * knots[k, START] + u * knots[k + 1, START]
-        leave = w * knots[k, EXIT] + u * knots[k + 1, EXIT]
-        angle = _hermite(knots[k, TOOL_ANGLE], knots[k, TOOL_SPEED], knots[k + 1, TOOL_ANGLE],
-                         knots[k + 1, TOOL_SPEED], span, u)
-        turned = angle - scalars[ANGLE]
+        for c in range(knots.shape[1]):
+            now[c] = (1.0 - u) * knots[k, c] + u * knots[k + 1, c]
+        now[TOOL_ANGLE] = _hermite(knots[k, TOOL_ANGLE], knots[k, TOOL_SPEED], knots[k + 1, TOOL_ANGLE],
+                                   knots[k + 1, TOOL_SPEED], span, u)
+        turned = now[TOOL_ANGLE] - scalars[ANGLE]
         psi0 = scalars[PSI]
-        psi1 = psi0 + turned / (1.0 + slip)
+        psi1 = psi0 + turned / (1.0 + now[SLIP])
+        turning = turned > 0.0 and now[TOOL_SPEED] > 0.0 and now[EXIT] > now[START]
 
-        # Displacement at the end of the step, the force held: third order in dt at the chip.
+        # The step without the force's change, and the displacement at its end with the force held:
+        # the chip is then right to third order in dt.
         px = py = 0.0
         for m in range(modes.shape[0]):
             load = modes[m, SHAPE_X] * force[0] + modes[m, SHAPE_Y] * force[1] + modes[m, SHAPE_Z] * force[2]
-            predicted[m, 0] = modes[m, A11] * modal[m, 0] + modes[m, A12] * modal[m, 1] + modes[m, B1] * load
-            predicted[m, 1] = modes[m, A21] * modal[m, 0] + modes[m, A22] * modal[m, 1] + modes[m, B2] * load
-            end = predicted[m, 0] + modes[m, C1] * load
-            side = modes[m, SIDE]
-            px += side * side * modes[m, SHAPE_X] * end
-            py += side * side * modes[m, SHAPE_Y] * end
-
-        # Cutting force there.
-        fx = fy = fz = 0.0
+            free[m, 0] = modes[m, A11] * modal[m, 0] + modes[m, A12] * modal[m, 1] + modes[m, B1] * load
+            free[m, 1] = modes[m, A21] * modal[m, 0] + modes[m, A22] * modal[m, 1] + modes[m, B2] * load
+            if modes[m, SIDE] != 0.0:
+                px += modes[m, SHAPE_X] * (free[m, 0] + modes[m, C1] * load)
+                py += modes[m, SHAPE_Y] * (free[m, 0] + modes[m, C1] * load)
         chip = 0.0
-        margin = 4.0 * max(cell, turned) + 1.5 * longest_pitch * slip
-        lowest = 0.5 * (start + leave) - math.pi
-        inner = bar_radius - depth
-        lag_step = lag_per_depth * depth / slices
-        turning = turned > 0.0 and tool_speed > 0.0 and leave > start
+        force[:] = 0.0
         if turning:
-            for j in range(teeth):
-                period = pitch[j] / tool_speed
-                ahead = j + 1 if j + 1 < teeth else 0
-                for s in range(slices):
-                    lag = (s + 0.5) * lag_step
-                    phi = angle + tooth_angle[j] - lag
-                    phi -= 2.0 * math.pi * math.floor((phi - lowest) / (2.0 * math.pi))
-                    wrapped[j, s] = phi
-                    zone[j, s] = start - margin <= phi <= leave + margin
-                    height[j, s] = -1.0
-                    if not zone[j, s] or depth <= 0.0:
-                        continue
-                    weight = _ramp((phi - start) / turned) - _ramp((phi - leave) / turned)
-                    if weight <= 0.0:
-                        continue
-                    sin, cos = math.sin(phi), math.cos(phi)
-                    low = depth * s / slices
-                    high = depth * (s + 1) / slices
-                    if bar_radius > 0.0:
-                        reach = radius * sin
-                        high = min(high, math.sqrt(max(0.0, bar_radius * bar_radius - reach * reach)) - inner)
-                    width = weight * (high - low)
-                    if width <= 0.0:
-                        continue
-                    height[j, s] = 0.5 * (low + high)
-                    feed = (feed_x + feed_x_slope * height[j, s]) * sin + feed_y * cos
-                    left = _cubic(surface[ahead, s], (psi1 + tooth_angle[j] - lag) / cell)
-                    h = runout[j] + px * sin + py * cos + feed * period - left
-                    if h <= 0.0:
-                        continue
-                    chip = max(chip, h)
-                    tangential = width * (coefficients[0] * h + coefficients[3])
-                    radial = width * (coefficients[1] * h + coefficients[4])
-                    axial = width * (coefficients[2] * h + coefficients[5])
-                    fx -= radial * sin + tangential * cos
-                    fy -= radial * cos - tangential * sin
-                    fz -= axial
+            chip = _cut(now, turned, psi1, px, py, tooth_angle, pitch, runout, shape, coefficients, surface, place, force)
 
-        # Modes with the force linear over the step.
-        sound = 0.0
-        dx0, dy0, dvx0, dvy0 = rx, ry, vx, vy
-        rx = ry = vx = vy = 0.0
-        for c in range(raw.shape[1]):
-            raw[i, c] = 0.0
+        # The modes at the end of the step, the force linear over it.
+        raw[i, :] = 0.0
         for m in range(modes.shape[0]):
-            load = modes[m, SHAPE_X] * fx + modes[m, SHAPE_Y] * fy + modes[m, SHAPE_Z] * fz
-            q = predicted[m, 0] + modes[m, C1] * load
-            v = predicted[m, 1] + modes[m, C2] * load
-            modal[m, 0] = q
-            modal[m, 1] = v
-            acceleration = modes[m, INVERSE_MASS] * (load - modes[m, STIFFNESS] * q - modes[m, DAMPING] * v)
-            sound += modes[m, RADIATION] * acceleration
+            load = modes[m, SHAPE_X] * force[0] + modes[m, SHAPE_Y] * force[1] + modes[m, SHAPE_Z] * force[2]
+            q = free[m, 0] + modes[m, C1] * load
+            v = free[m, 1] + modes[m, C2] * load
+            modal[m, 0], modal[m, 1] = q, v
+            raw[i, 1] += modes[m, RADIATION] * modes[m, INVERSE_MASS] * (
+                load - modes[m, STIFFNESS] * q - modes[m, DAMPING] * v)
             side = modes[m, SIDE]
-            if side == 0.0:
-                continue
-            rx += modes[m, SHAPE_X] * q
-            ry += modes[m, SHAPE_Y] * q
-            vx += modes[m, SHAPE_X] * v
-            vy += modes[m, SHAPE_Y] * v
-            column = 2 if side > 0.0 else 5
-            raw[i, column] += side * modes[m, SHAPE_X] * q
-            raw[i, column + 1] += side * modes[m, SHAPE_Y] * q
-            raw[i, column + 2] += side * modes[m, SHAPE_Z] * q
-        force[0], force[1], force[2] = fx, fy, fz
-        raw[i, 0] = angle
-        raw[i, 1] = sound
-        raw[i, 8], raw[i, 9], raw[i, 10] = fx, fy, fz
-
-        # The surface that each tooth leaves, at every node of material angle that it passed.
+            if side != 0.0:
+                column = 2 if side > 0.0 else 5
+                raw[i, column] += side * modes[m, SHAPE_X] * q
+                raw[i, column + 1] += side * modes[m, SHAPE_Y] * q
+                raw[i, column + 2] += side * modes[m, SHAPE_Z] * q
+        raw[i, 0] = now[TOOL_ANGLE]
+        raw[i, 8:11] = force
+        motion[0] = motion[1]
+        _move(modes, modal, motion[1])
         if turning:
-            lag_before = lag_per_depth * scalars[LAST_DEPTH] / slices
-            for j in range(teeth):
-                period = pitch[j] / tool_speed
-                ahead = j + 1 if j + 1 < teeth else 0
-                for s in range(slices):
-                    if not zone[j, s]:
-                        continue
-                    before = (psi0 + tooth_angle[j] - (s + 0.5) * lag_before) / cell
-                    after = (psi1 + tooth_angle[j] - (s + 0.5) * lag_step) / cell
-                    node = math.floor(before) + 1.0
-                    while node <= after:
-                        part = (node - before) / (after - before)
-                        phi = wrapped[j, s] - (1.0 - part) * turned
-                        sin, cos = math.sin(phi), math.cos(phi)
-                        edge = runout[j] + sin * _hermite(dx0, dvx0, rx, vx, dt, part) \
-                            + cos * _hermite(dy0, dvy0, ry, vy, dt, part)
-                        place = int(node) % cells
-                        if height[j, s] >= 0.0 and start <= phi <= leave:
-                            feed = (feed_x + feed_x_slope * height[j, s]) * sin + feed_y * cos
-                            edge = max(edge, surface[ahead, s, place] - feed * period)
-                        surface[j, s, place] = edge
-                        node += 1.0
+            _leave_surface(now, turned, dt, psi0, psi1, scalars[LAST_DEPTH], motion, tooth_angle, pitch, runout,
+                           shape[2], place, surface)
 
         # Relative displacement at equal angles of the tool, for the truth.
         scalars[CHIP] = max(scalars[CHIP], chip)
         if turned > 0.0:
-            mark = math.floor(scalars[ANGLE] / mark_angle) + 1.0
-            while mark * mark_angle <= angle:
+            mark = scalars[NEXT_MARK]
+            while mark * mark_angle <= now[TOOL_ANGLE]:
                 part = (mark * mark_angle - scalars[ANGLE]) / turned
                 marks[written, 0] = time - (1.0 - part) * dt
-                marks[written, 1] = _hermite(dx0, dvx0, rx, vx, dt, part)
-                marks[written, 2] = _hermite(dy0, dvy0, ry, vy, dt, part)
+                marks[written, 1] = _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
+                marks[written, 2] = _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 marks[written, 3] = scalars[CHIP]
                 scalars[CHIP] = 0.0
                 written += 1
                 mark += 1.0
-        scalars[ANGLE] = angle
+            scalars[NEXT_MARK] = mark
+        scalars[ANGLE] = now[TOOL_ANGLE]
         scalars[PSI] = psi1
-        scalars[LAST_DEPTH] = depth
+        scalars[LAST_DEPTH] = max(0.0, now[DEPTH])
     return written
 
 

@@ -15,7 +15,7 @@ class SimulationConfig:
 
     sample_rate [Hz] of all channels, an integer; channels: names from sensors.CHANNELS; oversampling:
     integration steps per sample (0: enough for 100 kHz); block_duration [s]; axes_rate [Hz] of
-    the axis states that `simulate` makes; slices along the tool axis (0: one per 0.01 rad of helix
+    the axis states that `simulate` makes; slices along the tool axis (0: one per 0.02 rad of helix
     lag at the largest depth, at most 32); displacement_noise [m rms], force_noise [N rms], white;
     sound: the sound model; start_ns: stamp of the first sample; device, stream_id: of the blocks.
     """
@@ -26,7 +26,7 @@ class SimulationConfig:
     block_duration: float = 0.02
     axes_rate: float = 250.0
     slices: int = 0
-    displacement_noise: float = 1e-7
+    displacement_noise: float = 5e-8
     force_noise: float = 0.5
     sound: SoundModel = SoundModel()
     start_ns: int = 0

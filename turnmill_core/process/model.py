@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from turnmill_core.cutting.engagement import span_across_feed
-from turnmill_core.cutting.feed import feed_angle, feed_velocity
 from turnmill_core.machine.axes import AXES, AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool
-from turnmill_core.operation import Mode, Operation
+from turnmill_core.operation import Conditions, Mode, Operation
 from turnmill_core.process import _kernels
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.sensors import CHANNELS, SoundModel, antialias_taps
@@ -22,7 +20,7 @@ from turnmill_core.process.truth import principal_turns
 Floats = NDArray[np.float64]
 
 SPINDLE = AXES.index("s")
-LAG_PER_SLICE = 0.01
+LAG_PER_SLICE = 0.02
 MOST_SLICES = 32
 
 
@@ -31,9 +29,9 @@ class ProcessModel:
     """Operation and configuration as the integrator wants them.
 
     dt [s]; modes (M, 16) and the surface's cells see _kernels; tooth_angle, pitch [rad], runout [m]
-    (teeth,); radius, bar_radius (0: a block) [m]; lag_per_depth [rad/m]; coefficients (6,): Ktc, Krc,
+    (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), lag per height [rad/m]; coefficients (6,): Ktc, Krc,
     Kac [Pa], Kte, Kre, Kae [N/m]; taps: anti-alias filter; columns: of the raw signals, one per
-    channel; turns: tool revolutions in a principal period.
+    channel; turns: tool revolutions in a principal period; uneven: the teeth are not equally spaced.
     """
 
     op: Operation
@@ -42,9 +40,7 @@ class ProcessModel:
     tooth_angle: Floats
     pitch: Floats
     runout: Floats
-    radius: float
-    bar_radius: float
-    lag_per_depth: float
+    shape: Floats
     coefficients: Floats
     slices: int
     cells: int
@@ -52,6 +48,7 @@ class ProcessModel:
     columns: tuple[int, ...]
     teeth: int
     turns: int
+    uneven: bool
 
 
 def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
@@ -66,13 +63,14 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     return ProcessModel(
         op=op, dt=dt, modes=_modes(op, config.sound, dt),
         tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
-        runout=np.array(tool.runout or (0.0,) * tool.teeth), radius=tool.radius,
-        bar_radius=op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth=lag_per_depth,
+        runout=np.array(tool.runout or (0.0,) * tool.teeth),
+        shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth]),
         coefficients=np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae]),
         slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
         taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),
         teeth=tool.teeth, turns=principal_turns(tool),
+        uneven=bool(np.ptp(pitch) > 1e-9),
     )
 
 
@@ -80,9 +78,6 @@ def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
     """One row of _kernels.advance's knots from an axis state: what the cut looks like at that instant."""
     op = model.op
     conditions = conditions_from_axes(op, axes)
-    depth = max(0.0, conditions.depth)
-    middle = np.array([depth / 2])
-    feed = feed_velocity(op, conditions, np.array([0.0, 1e-3]))
     row = np.zeros(_kernels.KNOT_COLUMNS)
     row[_kernels.TIME] = (axes.stamp_ns - base_ns) * 1e-9
     row[_kernels.TOOL_ANGLE] = axes.position[SPINDLE]
@@ -90,13 +85,47 @@ def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
     if conditions.tool_speed > 0:
         row[_kernels.SLIP] = abs(conditions.workpiece_speed) / conditions.tool_speed
     row[_kernels.DEPTH] = conditions.depth
-    row[_kernels.FEED_X], row[_kernels.FEED_Y] = feed[0]
-    row[_kernels.FEED_X_SLOPE] = (feed[1, 0] - feed[0, 0]) / 1e-3
-    lower, upper = span_across_feed(op, conditions, middle)
-    epsilon = feed_angle(op, conditions, middle)
-    row[_kernels.START] = float(np.arccos(np.clip(upper / op.tool.radius, -1, 1))[0] - epsilon[0])
-    row[_kernels.EXIT] = float(np.arccos(np.clip(lower / op.tool.radius, -1, 1))[0] - epsilon[0])
+    row[_kernels.FEED_X], row[_kernels.FEED_Y], row[_kernels.FEED_X_SLOPE], row[_kernels.START], row[_kernels.EXIT] = (
+        _arc(op, conditions))
     return row
+
+
+def _arc(op: Operation, conditions: Conditions) -> tuple[float, float, float, float, float]:
+    """Feed [m/s] along x_T and y_T and its slope along the tool axis [1/s], start and exit angle [rad] at the tip.
+
+    What cutting.feed and cutting.engagement say, without arrays (an axis state comes every few
+    milliseconds), and as if the bar were wide: the kernel lets the cut end where the bar does.
+    """
+    radius = op.tool.radius
+    lower, upper = conditions.cross_feed_span
+    if op.process == "milling":
+        start, leave = (math.acos(max(-1.0, min(1.0, y / radius))) for y in (upper, lower))
+        return conditions.feed_speed, 0.0, 0.0, start, leave
+    speed, lever = abs(conditions.workpiece_speed), conditions.effective_radius
+    sense = 1.0 if lower + upper >= 0 else -1.0
+    if sense < 0:
+        lower, upper = -upper, -lower
+    if speed == 0:
+        lower, upper = -radius, radius
+    epsilon = math.atan2(conditions.feed_speed, speed * lever)
+    start, leave = (_crossing(y, radius, lever, conditions.feed_speed / speed if speed else 0.0, epsilon)
+                    for y in (upper, lower))
+    if sense < 0:
+        start, leave = math.pi - leave, math.pi - start
+    return speed * lever, sense * conditions.feed_speed, speed, start, leave
+
+
+def _crossing(wall: float, radius: float, lever: float, lead: float, epsilon: float) -> float:
+    """Angle [rad] at which the tool's flank crosses a wall across the feed (see cutting.engagement.axial_place)."""
+    phi = math.acos(max(-1.0, min(1.0, wall / radius))) - epsilon
+    if abs(wall) >= radius * (1 - 1e-12) or lead == 0.0:
+        return phi
+    for _ in range(8):
+        x, y = radius * math.sin(phi), radius * math.cos(phi)
+        beyond = radius * (math.sqrt(1 + lead**2 / (lever**2 + x**2)) - 1)
+        excess = y - lead * math.atan2(x, lever) - beyond - wall
+        phi = math.acos(max(-1.0, min(1.0, math.cos(phi + epsilon) - excess / radius))) - epsilon
+    return phi
 
 
 def _modes(op: Operation, sound: SoundModel, dt: float) -> Floats:

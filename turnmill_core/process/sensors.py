@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 AIR_DENSITY = 1.204
 STOPBAND_DB = 80.0
-FRAME = 4096
+FRAME = 1024
 
 CHANNELS: dict[str, Channel] = {
     "sound": Channel("sound", "sound_pressure", "Pa", "machine enclosure"),
@@ -69,14 +69,14 @@ class SoundModel:
     tool_area: float = 0.004
     workpiece_area: float = 0.012
     panels: tuple[Mode, ...] = (
-        Mode(1380.0, 0.05, 60.0, (0.6, 0.64, 0.48)),
-        Mode(2750.0, 0.04, 35.0, (0.64, -0.6, 0.48)),
-        Mode(4200.0, 0.04, 20.0, (0.48, 0.6, 0.64)),
+        Mode(1380.0, 0.05, 20.0, (0.6, 0.64, 0.48)),
+        Mode(2750.0, 0.04, 12.0, (0.64, -0.6, 0.48)),
+        Mode(4200.0, 0.04, 7.0, (0.48, 0.6, 0.64)),
     )
     panel_area: float = 0.08
-    background: float = 0.004
+    background: float = 0.015
     background_corner: float = 300.0
-    tones: tuple[Tone, ...] = (Tone(0.003, order=1.0), Tone(0.0015, order=2.0), Tone(0.002, frequency=100.0))
+    tones: tuple[Tone, ...] = (Tone(0.006, order=1.0), Tone(0.003, order=2.0), Tone(0.004, frequency=100.0))
 
     def __post_init__(self) -> None:
         require(self.distance > 0, "microphone distance", self.distance, "m", "a number > 0")

@@ -27,7 +27,7 @@ from turnmill_core.process import _kernels
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.model import ProcessModel, knot, process_model
 from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
-from turnmill_core.process.truth import MARKS_PER_TURN, Truth, truth_of_marks
+from turnmill_core.process.truth import MARKS_PER_TURN, Truth, join_truth, truth_of_marks
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class SimulationState:
     """Everything that the next step needs; made by `initial`, returned by `step`, never changed.
 
     steps: index of the last integration step; base_ns: stamp of step 0; knot: last axis state as the
-    integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (4,), surface
+    integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (5,), surface
     (teeth, slices, cells): see _kernels.advance; rows: raw signals that the anti-alias filter still
     needs; next_sample: the sample that they centre on; samples: measured but not yet in a block;
     next_block: index of the block's first sample; background: last value of the noise filter; marks:
@@ -92,7 +92,7 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
     half = len(model.taps) // 2
     return SimulationState(
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
-        force=np.zeros(3), scalars=np.zeros(4), surface=surface, rows=np.zeros((half, len(_kernels.RAW))),
+        force=np.zeros(3), scalars=np.zeros(_kernels.SCALARS), surface=surface, rows=np.zeros((half, len(_kernels.RAW))),
         next_sample=0, samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
         marks=np.zeros((0, 4)), first_mark_skip=-1,
     )
@@ -109,7 +109,7 @@ def step(
     """
     chunk = tuple(axes)
     if not chunk:
-        return state, Chunk((), (), _no_truth())
+        return state, Chunk((), (), join_truth(()))
     base_ns = state.base_ns if len(state.knot) else chunk[0].stamp_ns
     knots = np.concatenate([state.knot, *(knot(state.model, a, base_ns)[None, :] for a in chunk)])
     stamps = knots[:, _kernels.TIME]
@@ -153,7 +153,8 @@ def simulate(
 
 def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationState:
     """State at the first axis state: angles set, one row of raw signals at time 0."""
-    scalars = np.array([first[_kernels.TOOL_ANGLE], 0.0, max(0.0, first[_kernels.DEPTH]), 0.0])
+    next_mark = math.floor(first[_kernels.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
+    scalars = np.array([first[_kernels.TOOL_ANGLE], 0.0, max(0.0, first[_kernels.DEPTH]), 0.0, next_mark])
     row = np.zeros((1, len(_kernels.RAW)))
     row[0, 0] = first[_kernels.TOOL_ANGLE]
     modes = state.model.modes
@@ -162,7 +163,6 @@ def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationSta
         shapes = side * modes[chosen][:, _kernels.SHAPE_X : _kernels.SHAPE_Z + 1]
         row[0, column : column + 3] = state.modal[chosen, 0] @ shapes
     period = MARKS_PER_TURN * state.model.turns
-    next_mark = math.floor(first[_kernels.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
     return replace(state, base_ns=base_ns, scalars=scalars, rows=np.concatenate([state.rows, row]),
                    first_mark_skip=-next_mark % period)
 
@@ -183,9 +183,8 @@ def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) 
     written = 0
     if count:
         written = _kernels.advance(
-            state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.radius,
-            model.bar_radius, model.lag_per_depth, model.coefficients, modal, force, scalars, surface, raw,
-            MARKS_PER_TURN, marks,
+            state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
+            model.coefficients, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
         )
     advanced = replace(state, steps=state.steps + count, knot=knots[-1:], modal=modal, force=force, scalars=scalars,
                        surface=surface, rows=np.concatenate([state.rows, raw]))
@@ -197,7 +196,8 @@ def _finish_chunk(
 ) -> tuple[SimulationState, Chunk]:
     """Measure, cut into blocks, and tell the truth."""
     skipped = min(state.first_mark_skip, len(marks))
-    truth, rest = truth_of_marks(np.concatenate([state.marks, marks[skipped:]]), state.model.teeth, state.model.turns)
+    truth, rest = truth_of_marks(np.concatenate([state.marks, marks[skipped:]]), state.model.teeth, state.model.turns,
+                                 state.model.uneven)
     state = replace(state, marks=rest, first_mark_skip=state.first_mark_skip - skipped)
     state = _measure(config, state)
     size = config.block_samples
@@ -238,7 +238,3 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
             signals[:, c] += level * white_noise(state.seed, 1 + list(CHANNELS).index(name), state.next_sample, count)
     return replace(state, rows=state.rows[count * ratio :], next_sample=state.next_sample + count,
                    background=background, samples=np.concatenate([state.samples, signals.astype(np.float32)]))
-
-
-def _no_truth() -> Truth:
-    return truth_of_marks(np.zeros((0, 4)), 1, 1)[0]

@@ -9,7 +9,8 @@ is fitted through the values of successive periods:
   their mean (the static deflection);
 - asynchronous amplitude: rms of the residuals about the lines, with PERIODS - 2 degrees of freedom;
 - half-order amplitude: the part of the synchronous amplitude at odd multiples of half the tooth
-  passing frequency.
+  passing frequency (no value where tooth spacing is uneven);
+- chatter frequency: of the strongest line of the residuals (x and y together).
 
 x and y are added in squares. The principal period is one tool revolution, and two for an odd number
 of equally spaced teeth, where half the tooth passing frequency is not a multiple of the spindle's.
@@ -30,6 +31,7 @@ Floats = NDArray[np.float64]
 MARKS_PER_TURN = 240
 PERIODS = 8
 CROSSING = 0.2
+FIELDS = ("time", "synchronous", "asynchronous", "half_order", "frequency", "in_cut", "touched")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,7 @@ class Truth:
     """Noise-free amplitudes at the middle of successive windows, one principal period apart.
 
     time (n,) [s] since the first axis state; synchronous, asynchronous, half_order (n,) [m rms];
-    in_cut (n,): some chip is cut in every tool revolution of the window; touched (n,): some chip is
+    frequency (n,): strongest asynchronous line [Hz]; in_cut (n,): some chip is cut in every tool revolution of the window; touched (n,): some chip is
     cut in the window.
     """
 
@@ -45,11 +47,12 @@ class Truth:
     synchronous: Floats
     asynchronous: Floats
     half_order: Floats
+    frequency: Floats
     in_cut: NDArray[np.bool_]
     touched: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        for name in ("time", "synchronous", "asynchronous", "half_order", "in_cut", "touched"):
+        for name in FIELDS:
             array = getattr(self, name)
             if array.shape != self.time.shape:
                 raise ValueError(f"truth {name} has shape {array.shape}, expected {self.time.shape}")
@@ -76,31 +79,31 @@ def principal_turns(tool: Tool) -> int:
     return 2 if tool.teeth % 2 and np.ptp(tool.pitch) < 1e-9 else 1
 
 
-def truth_of_marks(marks: Floats, teeth: int, turns: int) -> tuple[Truth, Floats]:
+def truth_of_marks(marks: Floats, teeth: int, turns: int, uneven: bool = False) -> tuple[Truth, Floats]:
     """Amplitudes of every full window in `marks`, and the marks that later windows need.
 
     marks (n, 4): time [s], relative displacement x, y [m], largest chip [m] since the mark before,
     at equal angles, MARKS_PER_TURN to the revolution, beginning at a principal period. turns: tool
-    revolutions in a principal period.
+    revolutions in a principal period; uneven: the teeth are not equally spaced.
     """
     length = MARKS_PER_TURN * turns
     periods = len(marks) // length
     windows = max(0, periods - PERIODS + 1)
-    values = np.zeros((windows, 4))
+    half_order = teeth * turns // 2 if (teeth * turns) % 2 == 0 and not uneven else 0
+    values = np.zeros((windows, 5))
     in_cut = np.zeros(windows, dtype=np.bool_)
     touched = np.zeros(windows, dtype=np.bool_)
     for i in range(windows):
         window = marks[i * length : (i + PERIODS) * length]
-        values[i] = _amplitudes(window, length, teeth * turns // 2 if (teeth * turns) % 2 == 0 else 0)
+        values[i] = _amplitudes(window, length, half_order)
         chips = window[:, 3].reshape(-1, MARKS_PER_TURN).max(axis=1)
         in_cut[i] = bool(np.all(chips > 0))
         touched[i] = bool(np.any(chips > 0))
-    truth = Truth(values[:, 0].copy(), values[:, 1].copy(), values[:, 2].copy(), values[:, 3].copy(), in_cut, touched)
-    return truth, marks[windows * length :].copy()
+    return Truth(*(values[:, c].copy() for c in range(5)), in_cut, touched), marks[windows * length :].copy()
 
 
-def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float]:
-    """Middle time, synchronous, asynchronous and half-order amplitude of one window."""
+def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float, float]:
+    """Middle time, synchronous, asynchronous and half-order amplitude and chatter frequency of one window."""
     values = window[:, 1:3].reshape(PERIODS, length, 2)
     step = np.arange(PERIODS) - (PERIODS - 1) / 2
     mean = values.mean(axis=0)
@@ -113,30 +116,44 @@ def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, fl
         lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
         half = float(np.sqrt(2 * np.sum(lines[half_order : length // 2 : 2 * half_order])))
     middle = float(np.interp((len(window) - 1) / 2, np.arange(len(window)), window[:, 0]))
-    return middle, float(synchronous), float(asynchronous), half
+    rate = (len(window) - 1) / (window[-1, 0] - window[0, 0])
+    return middle, float(synchronous), float(asynchronous), half, _strongest(residual.reshape(-1, 2)) * rate
+
+
+def _strongest(values: Floats) -> float:
+    """Frequency of the strongest line in `values` (n, 2), in cycles per sample, by a parabola through the peak."""
+    if not np.any(values):
+        return np.nan
+    power = np.sum(np.abs(np.fft.rfft(values * np.hanning(len(values))[:, None], 4 * len(values), axis=0)) ** 2, axis=1)
+    peak = int(np.argmax(power[1:-1])) + 1
+    left, top, right = np.log(power[peak - 1 : peak + 2] + np.finfo(float).tiny)
+    curve = left - 2 * top + right
+    return float((peak + (0.5 * (left - right) / curve if curve < 0 else 0.0)) / (4 * len(values)))
 
 
 def join_truth(parts: Iterable[Truth]) -> Truth:
     """One truth from successive parts."""
     found = list(parts)
-    names = ("time", "synchronous", "asynchronous", "half_order", "in_cut", "touched")
     if not found:
-        empty = np.zeros(0)
-        none = np.zeros(0, dtype=np.bool_)
-        return Truth(empty, empty.copy(), empty.copy(), empty.copy(), none, none.copy())
-    return Truth(*(np.concatenate([getattr(part, name) for part in found]) for name in names))
+        return truth_of_marks(np.zeros((0, 4)), 1, 1)[0]
+    return Truth(*(np.concatenate([getattr(part, name) for part in found]) for name in FIELDS))
 
 
 def crossings(truth: Truth, share: float = CROSSING) -> tuple[Crossing, ...]:
     """Moments when the asynchronous amplitude passes `share` of the synchronous one, while in the cut.
 
-    The ratio is interpolated linearly in its logarithm between windows. A move into or out of the
-    cut is no crossing.
+    The ratio is interpolated linearly in its logarithm between windows. A move into or out of the cut
+    is no crossing, nor is the end of the transient that every entry begins with.
     """
     ratio = truth.ratio
-    found = []
+    found: list[Crossing] = []
+    settled = False
     for i in range(1, len(ratio)):
         before, after = ratio[i - 1], ratio[i]
+        entering = not settled
+        settled = not np.isnan(after) and (settled or after <= share)
+        if entering:
+            continue
         if np.isnan(before) or np.isnan(after) or (before > share) == (after > share):
             continue
         low, high = np.log(max(before, 1e-12)), np.log(max(after, 1e-12))
