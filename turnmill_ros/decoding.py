@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError, get_types_from_msg
 from rosbags.typesys.store import Typestore
 
@@ -41,13 +43,27 @@ def decoder(name: str, text: str) -> Decoder:
         raise InputError("the embedded schema cannot be parsed", key=name) from error
     present = typestore()
     if all(present.fielddefs.get(key, ((), None))[1] == fields for key, (_, fields) in definitions.items()):
-        return Decoder(lambda data: present.deserialize_cdr(data, name), False)
+        return Decoder(lambda data: _deserialize(present, name, data), False)
     embedded = Typestore()
     embedded.register(definitions)
     if name not in present.fielddefs:
-        return Decoder(lambda data: embedded.deserialize_cdr(data, name), False)
+        return Decoder(lambda data: _deserialize(embedded, name, data), False)
     missing, extra = _compare(embedded, name, "")
-    return Decoder(lambda data: upgrade(embedded.deserialize_cdr(data, name), name), True, missing, extra)
+    return Decoder(lambda data: upgrade(_deserialize(embedded, name, data), name), True, missing, extra)
+
+
+def _deserialize(store: Typestore, name: str, data: bytes) -> Any:
+    """Message of CDR bytes, which may end in up to 16 bytes of padding.
+
+    ROS' serialize_message pads behind empty arrays of doubles (not so on the wire); rosbags refuses more than 3 bytes.
+    """
+    try:
+        return store.deserialize_cdr(data, name)
+    except SerdeError:
+        for surplus in (4, 8, 12, 16):
+            with suppress(SerdeError):
+                return store.deserialize_cdr(data[: len(data) - surplus], name)
+        raise
 
 
 def _compare(embedded: Typestore, name: str, prefix: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
