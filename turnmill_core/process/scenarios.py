@@ -29,7 +29,7 @@ def _config(second: str) -> SimulationConfig:
 
 
 SCENARIOS: dict[str, Scenario] = {
-    "demo": Scenario("demo_turn_milling.yaml", _config("tool_x"), 20180, 14.0,
+    "demo": Scenario("demo_turn_milling.yaml", _config("tool_x"), 20180, 13.0,
                      "Turn-milling: air, stable cut, drift into Hopf chatter, rescue by another tool speed."),
     "flip_3_teeth": Scenario("demo_flip_3_teeth.yaml", _config("workpiece_y"), 3, 5.0,
                              "Milling with 3 teeth: air, stable cut, flip chatter with its own half-order lines."),

@@ -73,7 +73,7 @@ class SoundModel:
         Mode(2750.0, 0.04, 12.0, (0.64, -0.6, 0.48)),
         Mode(4200.0, 0.04, 7.0, (0.48, 0.6, 0.64)),
     )
-    panel_area: float = 0.08
+    panel_area: float = 0.25
     background: float = 0.015
     background_corner: float = 300.0
     tones: tuple[Tone, ...] = (Tone(0.006, order=1.0), Tone(0.003, order=2.0), Tone(0.004, frequency=100.0))
