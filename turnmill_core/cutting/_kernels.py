@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 @njit(cache=True)
 def static_forces(
-    count: int, offset: Array, radius: Array, lag: Array, start: Array, stop: Array, feed: Array, delay: Array,
-    step: Array, width: Array, length: Array, coefficients: Array, lever: Array, result: Array,
+    count: int, window: float, offset: Array, radius: Array, lag: Array, start: Array, stop: Array, feed: Array,
+    delay: Array, step: Array, width: Array, length: Array, coefficients: Array, lever: Array, result: Array,
 ) -> float:
     """Add forces (x, y, z), tool torque and workpiece torque of the static chip to `result` (count, 5).
 
-    Each of the `count` angles stands for the cell around it; a cell that the cut enters or leaves
-    counts with its share, evaluated at the middle of that share. Returns the largest chip [m].
+    An element covers `window` [rad] around its angle; where the cut covers only a share of that
+    window, the element counts with the share, evaluated at its middle. Returns the largest chip [m].
     """
     cell = 2 * math.pi / count
     sine, cosine = np.empty(count), np.empty(count)
@@ -41,15 +41,15 @@ def static_forces(
                 if stop[k, arc] <= start[k, arc]:
                     continue
                 low, high = start[k, arc] - base, stop[k, arc] - base
-                first = math.floor(low / cell + 0.5)
-                last = math.ceil(high / cell - 0.5)
+                first = math.floor((low - window / 2) / cell)
+                last = math.ceil((high + window / 2) / cell)
                 row = first % count
                 for i in range(first, last + 1):
                     middle = i * cell
-                    left, right = max(middle - cell / 2, low), min(middle + cell / 2, high)
+                    left, right = max(middle - window / 2, low), min(middle + window / 2, high)
                     if right > left:
-                        if i in (first, last):
-                            share = (right - left) / cell
+                        if left == low or right == high:
+                            share = (right - left) / window
                             s, c = math.sin((left + right) / 2 + base), math.cos((left + right) / 2 + base)
                         else:
                             share = 1.0

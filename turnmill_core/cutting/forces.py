@@ -19,6 +19,8 @@ from turnmill_core.cutting.feed import feed_velocity
 from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.operation import Conditions, Material, Operation, require
 
+_POINT = 1e-6  # window [rad] that stands for a point where the edge has no helix
+
 
 @dataclass(frozen=True)
 class Revolution:
@@ -38,7 +40,7 @@ class Revolution:
 
 def revolution(
     op: Operation, conditions: Conditions, angles: int = 360, elements: int = 64, chip: ChipModel = "static",
-    engine: Literal["fast", "plain"] = "fast",
+    engine: Literal["fast", "plain"] = "fast", average: bool = False,
 ) -> Revolution:
     """Forces and torques at `angles` equal steps of one tool revolution, edges in `elements` discs.
 
@@ -55,15 +57,21 @@ def revolution(
         elements: number of axial elements m.
         chip: `static` (Eq. 3.44) or `exact` (trochoid, previous revolution's wall).
         engine: `fast` (compiled) or `plain` (numpy); the same to round-off.
+        average: with the static chip, every angle stands for the step around it, so that the mean
+            over the revolution is right to second order in the step whatever the helix; otherwise
+            the forces at the angles themselves.
 
     Raises:
         ValueError: not in cut, fewer than 4 angles, no elements, or a depth beyond the flute length.
     """
     require(angles >= 4, "angles", angles, "", "an integer >= 4")
     cut = prepare_cut(op, conditions, elements)
+    lag = abs(float(cut.elements.lag[0])) * 2
+    require(lag <= math.pi / 2, "elements", elements, "", f"enough for a lag of at most pi/2 in one, not {lag:.3g} rad")
+    window = 2 * math.pi / angles if average else max(lag, _POINT)
     result = np.zeros((angles, 5))
     run = _fast if engine == "fast" else _plain
-    largest = run(cut, op.material, chip, result)
+    largest = run(cut, op.material, chip, window, result)
     if op.process == "milling":
         result[:, 4] = 0.0
     angle = np.arange(angles) * (2 * math.pi / angles)
@@ -75,32 +83,31 @@ def _coefficients(material: Material) -> Array:
     return np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae])
 
 
-def _fast(cut: Cut, material: Material, chip: ChipModel, result: Array) -> float:
+def _fast(cut: Cut, material: Material, chip: ChipModel, window: float, result: Array) -> float:
     e, arcs = cut.elements, cut.engagement
     if chip == "static":
         return float(_kernels.static_forces(
-            len(result), e.offset, e.radius, e.lag, arcs.start, arcs.exit, cut.feed, cut.delay, cut.step, e.thickness,
-            e.length, _coefficients(material), cut.lever, result))
+            len(result), window, e.offset, e.radius, e.lag, arcs.start, arcs.exit, cut.feed, cut.delay, cut.step,
+            e.thickness, e.length, _coefficients(material), cut.lever, result))
     return float(_kernels.exact_forces(
         len(result), e.offset, e.radius, cut.tool_radius, e.lag, cut.feed, cut.sense, cut.lead, *cut.walls,
         cut.half_width, cut.lag, cut.step, cut.tool_speed, e.thickness, e.length, _coefficients(material), cut.lever,
         result))
 
 
-def _plain(cut: Cut, material: Material, chip: ChipModel, result: Array) -> float:
+def _plain(cut: Cut, material: Material, chip: ChipModel, window: float, result: Array) -> float:
     """The kernels' numpy twin: every angle, tooth, height and arc at once."""
     e = cut.elements
     count = len(result)
-    cell = 2 * math.pi / count
-    phi = (np.arange(count) * cell)[:, None, None] + e.offset[None, :, None] - e.lag[None, None, :]
+    phi = (np.arange(count) * (2 * math.pi / count))[:, None, None] + e.offset[None, :, None] - e.lag[None, None, :]
     if chip == "exact":
         return _sum_forces(cut, material, exact_chip(cut, phi), phi, np.ones_like(phi), result)
     largest = 0.0
     for start, stop in zip(cut.engagement.start.T, cut.engagement.exit.T, strict=True):
-        # the turn in which the cell around phi can overlap the arc, and the overlap
-        wrapped = start - cell / 2 + (phi - start + cell / 2) % (2 * math.pi)
-        left, right = np.maximum(wrapped - cell / 2, start), np.minimum(wrapped + cell / 2, stop)
-        share = np.maximum(right - left, 0.0) / cell
+        # the turn in which the window around phi can overlap the arc, and the overlap
+        wrapped = start - window / 2 + (phi - start + window / 2) % (2 * math.pi)
+        left, right = np.maximum(wrapped - window / 2, start), np.minimum(wrapped + window / 2, stop)
+        share = np.where(stop > start, np.maximum(right - left, 0.0) / window, 0.0)
         middle = (left + right) / 2
         largest = max(largest, _sum_forces(cut, material, static_chip(cut, middle), middle, share, result))
     return largest

@@ -14,13 +14,16 @@ from turnmill_core.cutting.tool import Array, middle_heights, read_only
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation
 
+_MEAN_ANGLES = 180
+
 
 @dataclass(frozen=True)
 class CuttingLoads:
     """Rigid cutting loads over one revolution of the tool spindle; the fields of turnmill_msgs/CuttingLoads.
 
     Forces [N] (3,) are those that the workpiece exerts on the tool, in the tool frame and in the
-    machine frame: mean, and peak, the value of largest magnitude of each component (signed).
+    machine frame: mean, integrated over the arcs, and peak, the value of largest magnitude of each
+    component (signed) at the sampled angles.
     Torques [N m] resist their spindle; powers [W]; chip_thickness_max [m]; cutting_speed [m/s],
     peripheral speed of the tool; tooth_passing_frequency [Hz]; material_removal_rate [m3/s];
     operation_hash, sha256 of the operation's text.
@@ -75,21 +78,25 @@ def cutting_loads(
     in_cut = bool(arcs.angle.any())
     if in_cut:
         turn = revolution(op, conditions, angles, elements, chip)
+        mean = revolution(op, conditions, _MEAN_ANGLES, elements, chip, average=True) if chip == "static" else turn
         angle, force, chip_max = turn.angle, turn.force_tool, turn.chip_thickness_max
         tool_torque, workpiece_torque = turn.tool_torque, turn.workpiece_torque
+        force_mean = mean.force_tool.mean(axis=0)
+        tool_torque_mean, workpiece_torque_mean = float(mean.tool_torque.mean()), float(mean.workpiece_torque.mean())
         volume = removal(op, conditions)
         rate, bottom_share = volume.total, volume.bottom_share
     else:
         angle = read_only(np.arange(angles) * (2 * math.pi / angles))
         force, chip_max = read_only(np.zeros((angles, 3))), 0.0
         tool_torque = workpiece_torque = read_only(np.zeros(angles))
+        force_mean, tool_torque_mean, workpiece_torque_mean = np.zeros(3), 0.0, 0.0
         rate, bottom_share = 0.0, 0.0
-    force_machine = force @ machine_from_tool(op, conditions).T
-    tool_torque_mean, workpiece_torque_mean = float(tool_torque.mean()), float(workpiece_torque.mean())
+    rotation = machine_from_tool(op, conditions)
+    force_machine = force @ rotation.T
     return CuttingLoads(
-        force_tool_mean=read_only(force.mean(axis=0)),
+        force_tool_mean=read_only(force_mean),
         force_tool_peak=read_only(_peak(force)),
-        force_machine_mean=read_only(force_machine.mean(axis=0)),
+        force_machine_mean=read_only(rotation @ force_mean),
         force_machine_peak=read_only(_peak(force_machine)),
         tool_torque_mean=tool_torque_mean,
         tool_torque_peak=float(_peak(tool_torque)),
