@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import typestore
 from turnmill_ros.topics import RECORDED
 
+_FOOTER = struct.Struct("<QQI")
 DAMAGE = (
     McapError, CRCValidationError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, KeyError, IndexError,
     OverflowError, MemoryError, TypeError, EOFError,
@@ -109,8 +111,9 @@ def open_mcap(path: Path) -> Iterator[McapReader]:
     with stream:
         _check_ends(stream, path)
         try:
+            _check_summary(stream)
             yield make_reader(stream, validate_crcs=True)
-        except DAMAGE as error:
+        except (OSError, *DAMAGE) as error:
             raise InputError("damaged recording", file=path, hint=f"turnmill recover {path}") from error
 
 
@@ -125,6 +128,21 @@ def _check_ends(stream: IO[bytes], path: Path) -> None:
     stream.seek(max(size - len(MAGIC), 0))
     if size < 2 * len(MAGIC) or stream.read(len(MAGIC)) != MAGIC:
         raise InputError("truncated recording", file=path, hint=f"turnmill recover {path}")
+    stream.seek(0)
+
+
+def _check_summary(stream: IO[bytes]) -> None:
+    """Raise ValueError where the summary section fails its checksum, which the MCAP reader does not look at."""
+    end = stream.seek(-len(MAGIC) - 4, 2)
+    stream.seek(-len(MAGIC) - _FOOTER.size, 2)
+    start, _, expected = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if start and expected:
+        stream.seek(start)
+        found = 0
+        while stream.tell() < end:
+            found = zlib.crc32(stream.read(min(1 << 20, end - stream.tell())), found)
+        if found != expected:
+            raise ValueError("the summary fails its checksum")
     stream.seek(0)
 
 

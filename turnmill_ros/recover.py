@@ -13,7 +13,6 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import breakup_chunk
-from rosbags.typesys.msg import normalize_msgtype
 
 from turnmill_ros.bag_read import DAMAGE
 from turnmill_ros.bag_write import BagWriter
@@ -159,7 +158,7 @@ class _Salvage:
 
     def _channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
-        name = normalize_msgtype(schema.name) if schema else ""
+        name = schema.name if schema else ""
         self.writer.add_channel(
             channel.topic, name, (schema.encoding, schema.data) if schema else ("", b""), channel.message_encoding,
             channel.metadata)
