@@ -1,0 +1,226 @@
+"""Feeds the chatter monitor from messages: the same for the node, for replay and for offline analysis.
+
+The monitor joins everything by stamp. What is decided here is only which operation holds for which
+block, which predictions the windows use, and for how long they wait for axis states.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from turnmill_core.machine.axes import AXES, AxisState
+from turnmill_core.monitoring.blocks import Channel, SensorBlock
+from turnmill_core.monitoring.chatter import (
+    ChatterConfig,
+    MonitorState,
+    RecordedPrior,
+    SpindleSpeed,
+    config_from_operation,
+    finish,
+    initial,
+    update,
+)
+from turnmill_core.monitoring.verdict import Verdict
+from turnmill_core.operation import Operation, require
+from turnmill_core.prediction import Prior
+from turnmill_ros.block_counts import BlockCounts
+from turnmill_ros.operation_track import OperationTrack
+
+MOST_HELD = 3000
+"""Blocks that wait at most; beyond it the oldest is judged with what is known."""
+
+KEPT_AXES_NS = 2_000_000_000
+SPINDLE = AXES.index("s")
+Judged = tuple[tuple[Verdict, str], ...]
+"""Verdicts, each with the hash of the operation that it was made for."""
+
+
+@dataclass(frozen=True)
+class FeedSettings:
+    """How the monitor is fed.
+
+    prior: "live", the newest prediction when a window is decided; "recorded", the one that the recorded
+    verdict on the same window used; "none".
+    axes: "live", windows wait for axis states up to the monitor's timeout; "recorded", blocks wait for those
+    that the recording holds, however far apart the topics arrive; "none", there are none.
+    changes: settings of the monitor other than those of :func:`config_from_operation`.
+    """
+
+    prior: Literal["live", "recorded", "none"] = "live"
+    axes: Literal["live", "recorded", "none"] = "live"
+    changes: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("prior", "axes"):
+            require(getattr(self, name) in ("live", "recorded", "none"), name, getattr(self, name), "",
+                    "live, recorded or none")
+
+    def config(self, operation: Operation) -> ChatterConfig:
+        """The monitor's settings for an operation."""
+        return replace(config_from_operation(operation), recorded_priors=self.prior == "recorded",
+                       expect_axes=self.axes != "none", **self.changes)  # type: ignore[arg-type]
+
+
+class MonitorFeed:
+    """A chatter monitor with what it still has to be given; each method returns the verdicts that became due.
+
+    An operation holds for the blocks from its stamp on (the first for all): then what waits under the
+    old one is judged and the monitor begins anew.
+    """
+
+    def __init__(self, settings: FeedSettings) -> None:
+        self.settings = settings
+        self.operations = OperationTrack()
+        self.counts = BlockCounts()
+        self.judged = self.dropped = 0
+        self._running: Operation | None = None
+        self._config: ChatterConfig | None = None
+        self._state: MonitorState | None = None
+        self._held: deque[SensorBlock] = deque()
+        self._coming: deque[SpindleSpeed] = deque()
+        self._given: deque[SpindleSpeed] = deque()
+        self._newest: dict[str, int] = {"axes": -1, "recorded": -1}
+        self._last_prior: Prior | None = None
+        self._recorded: deque[RecordedPrior] = deque(maxlen=1000)
+
+    def operation(self, stamp_ns: int, operation: Operation) -> Judged:
+        """An operation that holds from `stamp_ns` on."""
+        self.operations.add(stamp_ns, operation)
+        return self._pump()
+
+    def block(self, block: SensorBlock) -> Judged:
+        """A block of samples, in the order of its stream."""
+        self.counts.add(block)
+        self._held.append(block)
+        if len(self._held) > MOST_HELD and self.operations.first is None:
+            self._held.popleft()
+            self.dropped += 1
+        return self._pump()
+
+    def axes(self, axes: AxisState) -> Judged:
+        """An axis state."""
+        self._newest["axes"] = max(self._newest["axes"], axes.stamp_ns)
+        self._coming.append(SpindleSpeed(axes.stamp_ns, axes.velocity[SPINDLE]))
+        if self.settings.axes == "live":
+            return self._give_axes(axes.stamp_ns) + self._pump()
+        return self._pump()
+
+    def prior(self, prior: Prior) -> Judged:
+        """A prediction, used live from now on."""
+        if self.settings.prior != "live":
+            return ()
+        self._last_prior = prior
+        return self._give(prior)
+
+    def recorded(self, verdict: Verdict) -> Judged:
+        """A recorded verdict, whose prior is that of the same window."""
+        if self.settings.prior != "recorded":
+            return ()
+        self._newest["recorded"] = max(self._newest["recorded"], verdict.window_end_ns)
+        self._recorded.append(RecordedPrior(verdict.stream_id, verdict.last_sample, verdict.prior))
+        return self._give(self._recorded[-1]) + self._pump()
+
+    def finish(self) -> Judged:
+        """The end of the stream: judge what waits with what is known."""
+        return self._pump(ending=True) + self._end()
+
+    def fresh(self) -> MonitorFeed:
+        """A feed with the same settings and operations, and nothing received yet."""
+        new = MonitorFeed(self.settings)
+        new.operations = self.operations
+        return new
+
+    def warm(self, operation: Operation) -> None:
+        """Compile everything that a verdict on `operation` needs, on noise."""
+        trial = MonitorFeed(FeedSettings(prior="none", axes="none"))
+        trial.operation(0, operation)
+        noise = np.random.default_rng(0).standard_normal((30, 256, 1)).astype(np.float32)
+        channel = Channel("warm", "sound_pressure", "Pa")
+        for k, samples in enumerate(noise):
+            trial.block(SensorBlock(k * 20_000_000, "warm", 1, k * 256, 12800.0, (channel,), samples))
+        trial.finish()
+
+    def _pump(self, ending: bool = False) -> Judged:
+        judged: list[tuple[Verdict, str]] = []
+        while self._held:
+            block = self._held[0]
+            operation = self.operations.at(block.stamp_ns)
+            patient = not ending and len(self._held) <= MOST_HELD
+            if operation is None or (patient and not self._ready(block, operation)):
+                break
+            if operation is not self._running:
+                judged += self._end()
+                judged += self._begin(operation)
+            if self.settings.axes == "recorded":
+                judged += self._give_axes(end_ns(block))
+            self._held.popleft()
+            self.judged += 1
+            judged += self._give(block)
+            judged += self._go_without_prior()
+        return tuple(judged)
+
+    def _ready(self, block: SensorBlock, operation: Operation) -> bool:
+        """Whether everything that the windows ending in `block` wait for has arrived.
+
+        Before an operation takes over, also what the last windows under the old one wait for.
+        """
+        changing = self._running is not None and operation is not self._running
+        until = max(block.stamp_ns if changing else -1, end_ns(block) if self.settings.axes == "recorded" else -1)
+        late = self.settings.axes == "live" and self._config is not None and (
+            self._held[-1].stamp_ns - block.stamp_ns > self._config.speed_timeout * 1e9)
+        axes = self.settings.axes == "none" or late or self._newest["axes"] >= until
+        return axes and (self.settings.prior != "recorded" or self._newest["recorded"] >= end_ns(block))
+
+    def _begin(self, operation: Operation) -> Judged:
+        self._running, self._config = operation, self.settings.config(operation)
+        self._state = initial(self._config)
+        known: list[object] = [*self._given, *self._recorded]
+        if self._last_prior is not None:
+            known.append(self._last_prior)
+        return tuple(pair for item in known for pair in self._give(item))
+
+    def _end(self) -> Judged:
+        if self._state is None or self._config is None or self._running is None:
+            return ()
+        _, verdicts = finish(self._config, self._state)
+        operation, self._running, self._state = self._running, None, None
+        return tuple((verdict, operation.sha256) for verdict in verdicts)
+
+    def _give(self, item: object) -> Judged:
+        if self._state is None or self._config is None or self._running is None:
+            return ()
+        self._state, verdicts = update(self._config, self._state, item)  # type: ignore[arg-type]
+        return tuple((verdict, self._running.sha256) for verdict in verdicts)
+
+    def _give_axes(self, until_ns: int) -> Judged:
+        """Give axis states up to the first one that covers `until_ns`."""
+        judged: list[tuple[Verdict, str]] = []
+        while self._coming and (not self._given or self._given[-1].stamp_ns < until_ns):
+            self._given.append(self._coming.popleft())
+            judged += self._give(self._given[-1])
+        while self._given and self._given[-1].stamp_ns - self._given[0].stamp_ns > KEPT_AXES_NS:
+            self._given.popleft()
+        return tuple(judged)
+
+    def _go_without_prior(self) -> Judged:
+        """Windows that have no recorded verdict, though later ones have, are judged without a prediction."""
+        judged: list[tuple[Verdict, str]] = []
+        while self.settings.prior == "recorded" and self._state is not None:
+            due = next(((s.stream_id, s.next_end) for s in self._state.streams if s.next_end <= s.end), None)
+            if due is None:
+                break
+            new = self._give(RecordedPrior(due[0], due[1] - 1, None))
+            if not new:
+                break
+            judged += new
+        return tuple(judged)
+
+
+def end_ns(block: SensorBlock) -> int:
+    """Acquisition time of the sample after the block's last one [ns]."""
+    return block.stamp_ns + round(len(block.samples) * 1e9 / block.sample_rate)

@@ -1,0 +1,105 @@
+"""Simulated cutting process and sensors: axis states in, sensor blocks out, in real time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode, LifecycleState
+
+from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.controller import axis_state_at
+from turnmill_core.operation import Operation
+from turnmill_core.process.simulation import SimulationConfig, SimulationState, initial, step
+from turnmill_ros import topics
+from turnmill_ros.conversions import axes_from_message, block_to_message
+from turnmill_ros.interfaces import ros_types
+from turnmill_ros.nodes import _support as support
+from turnmill_ros.operation_track import OperationTrack
+from turnmill_ros.parameters import declare
+
+
+class ProcessSimulator(LifecycleNode):
+    """Integrates the cut over the axis states of one block at a time; says so when it falls behind them."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("process_simulator", **kwargs)
+        default = SimulationConfig(sample_rate=51200)
+        self._config = SimulationConfig(
+            sample_rate=declare(self, "sample_rate", default.sample_rate, "Hz", low=1000, high=204800),
+            channels=tuple(declare(self, "channels", list(default.channels), "names of the channels to measure")),
+            block_duration=declare(self, "block_duration", default.block_duration, "s", low=0.01, high=0.05),
+            device=declare(self, "device", default.device, "name of the acquisition device"))
+        self._seed = declare(self, "seed", 0, "seed of all noise", low=0)
+        self._allowed = declare(self, "allowed_lag", 0.25, "s, lag behind the axis states that is a warning", low=0.05)
+        self._match, lossless = support.declare_common(self)
+        self._operations, self._running = OperationTrack(), None
+        self._state: SimulationState | None = None
+        self._axes: list[AxisState] = []
+        self._sent, self._lag, self._most_lag = 0, 0.0, 0.0
+        self._publisher = support.publisher(self, topics.SENSOR_BLOCKS, keep_all=lossless)
+        self.diagnostics = support.Diagnostics(self, self._values, self._warning)
+        support.subscription(self, topics.OPERATION, self.on_operation)
+        support.subscription(self, topics.JOINT_STATES, self.on_axes)
+
+    def on_operation(self, message: Any) -> None:
+        """Cut something else from the operation's stamp on; the device then restarts."""
+        support.accept_operation(self, self._operations.add, message)
+
+    @support.transition
+    def on_configure(self, state: LifecycleState) -> None:
+        """Compile the integrator on the operation that is published."""
+        operation = support.wait_for_operation(self, self._operations)
+        step(self._config, initial(operation, self._config, 0), [
+            axis_state_at(operation, k * 0.004, k * 4_000_000) for k in range(10)])
+
+    @support.transition
+    def on_activate(self, state: LifecycleState) -> None:
+        """Wait for axis states."""
+        support.wait_until_matched(self, self._match)
+        self._running, self._axes = None, []
+        self.diagnostics.enter(support.ACTIVE)
+
+    @support.transition
+    def on_deactivate(self, state: LifecycleState) -> None:
+        """Stop; a block that is not full is not sent."""
+        support.drain(self)
+        support.wait_until_acknowledged(self)
+        self.diagnostics.enter("stopped", done=True)
+
+    def on_axes(self, message: Any) -> None:
+        """Integrate once the axis states cover a block."""
+        self._axes.append(axes_from_message(message))
+        if self._axes[-1].stamp_ns - self._axes[0].stamp_ns >= self._config.block_duration * 1e9 - 1:
+            axes, self._axes = self._axes, []
+            try:
+                self._advance(axes)
+            except ValueError as error:
+                self.get_logger().error(str(error))
+                self.diagnostics.fail(str(error))
+
+    def _advance(self, axes: list[AxisState]) -> None:
+        operation = self._operations.at(axes[0].stamp_ns)
+        if operation is not self._running:
+            self._begin(operation)
+        self._state, chunk = step(self._config, self._state, axes)
+        for block in chunk.blocks:
+            support.send(self._publisher, block_to_message(block, ros_types()))
+            self._sent += 1
+        self._lag = (self.get_clock().now().nanoseconds - axes[-1].stamp_ns) * 1e-9
+        self._most_lag = max(self._most_lag, self._lag)
+
+    def _begin(self, operation: Operation) -> None:
+        if self._running is not None:
+            self._config = replace(self._config, stream_id=self._config.stream_id + 1)
+        self._running, self._state = operation, initial(operation, self._config, self._seed)
+
+    def _warning(self) -> str | None:
+        return f"{self._lag:.2f} s behind the axis states" if self._lag > self._allowed else None
+
+    def _values(self) -> dict[str, object]:
+        return {"sensor_blocks_sent": self._sent, "lag_s": f"{self._lag:.3f}", "largest_lag_s": f"{self._most_lag:.3f}"}
+
+
+if __name__ == "__main__":
+    support.main(ProcessSimulator)

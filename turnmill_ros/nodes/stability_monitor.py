@@ -1,0 +1,235 @@
+"""Predicts how far the present cut is from chatter, and the stability lobes around it."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+import rclpy
+from rclpy.lifecycle import LifecycleNode, LifecycleState
+from turnmill_msgs.srv import GetStability
+
+from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.conditions import conditions_from_axes, with_cut
+from turnmill_core.operation import Conditions, Operation
+from turnmill_core.prediction import PredictedType
+from turnmill_core.stability.margin import (
+    Margin,
+    StabilityPoint,
+    nearest_stable_speed,
+    searched_depth,
+    stability_lobes,
+    stability_margin,
+    stability_point,
+)
+from turnmill_core.stability.margin import _limit as depth_limit
+from turnmill_ros import topics
+from turnmill_ros.conversions import axes_from_message, lobes_to_message, margin_to_message, scalar_to_message
+from turnmill_ros.interfaces import ros_types
+from turnmill_ros.node_table import MARGIN_PLOTS
+from turnmill_ros.nodes import _support as support
+from turnmill_ros.operation_track import OperationTrack
+from turnmill_ros.parameters import declare
+
+
+class Cut(NamedTuple):
+    """A cut on a grid of small relative steps, and its operation."""
+
+    operation: str
+    tool_speed: int
+    workpiece_speed: int
+    depth: int
+    lower: int
+    upper: int
+
+    def at_speeds(self) -> Cut:
+        """The cut without its depth."""
+        return self._replace(depth=0)
+
+
+class StabilityMonitor(LifecycleNode):
+    """Evaluates the cut when it changes, in a worker thread; an unchanged cut only gets a new stamp.
+
+    The depth limit is searched once the speeds have settled, and is NaN until then. Live, a worker that is busy
+    leaves cuts out; with `every_change` (replay) it takes them all in turn.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("stability_monitor", **kwargs)
+        self._period_ns = round(1e9 / declare(
+            self, "rate", topics.STABILITY_MARGIN.rate, "Hz, margins per second of axis time", low=0.1, high=50.0))
+        self._step = declare(self, "change", 0.005, "relative change of speed, depth or immersion that is a new cut",
+                             low=1e-6, high=0.1)
+        self._every = declare(self, "every_change", False, "evaluate every changed cut, however long it takes (replay)")
+        self._lobe_points = declare(self, "lobe_points", 24, "tool speeds in the stability diagram; 0: none",
+                                    low=0, high=400)
+        self._match, lossless = support.declare_common(self)
+        self._operations, self._next_ns, self._refused = OperationTrack(), 0, ""
+        self._last: tuple[Cut, StabilityPoint] | None = None
+        self._limits: dict[Cut, Margin] = {}
+        self._speeds: dict[Cut, float] = {}
+        self._pending: list[Future[None]] = []
+        self._drawn: set[tuple[str, float]] = set()
+        self._received = self._evaluated = self._sent = self._left_out = 0
+        self._worker = ThreadPoolExecutor(1, "stability")
+        self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
+            topics.STABILITY_MARGIN, topics.STABILITY_LOBES, *MARGIN_PLOTS)}
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
+        support.subscription(self, topics.OPERATION, self.on_operation)
+        support.subscription(self, topics.JOINT_STATES, self.on_axes)
+        self.create_service(GetStability, "get_stability", self.on_get)
+
+    def on_operation(self, message: Any) -> None:
+        """Predict for another operation from its stamp on."""
+        support.accept_operation(self, self._operations.add, message)
+
+    @support.transition
+    def on_configure(self, state: LifecycleState) -> None:
+        """Compile the solver on the operation that is published."""
+        operation = support.wait_for_operation(self, self._operations)
+        if operation.tool.structure.modes or operation.workpiece.structure.modes:
+            stability_point(operation, operation.conditions)
+
+    @support.transition
+    def on_activate(self, state: LifecycleState) -> None:
+        """Wait for axis states."""
+        support.wait_until_matched(self, self._match)
+        self._next_ns = 0
+        self.diagnostics.enter(support.ACTIVE)
+
+    @support.transition
+    def on_deactivate(self, state: LifecycleState) -> None:
+        """Finish what was begun (live: drop what was not), then stop."""
+        support.drain(self)
+        for pending in self._pending:
+            if self._every or not pending.cancel():
+                pending.result()
+        support.wait_until_acknowledged(self)
+        self.diagnostics.enter("stopped", done=True)
+
+    def on_axes(self, message: Any) -> None:
+        """Judge the cut of an axis state, if it is time to."""
+        self._received += 1
+        stamp = support.stamp_ns(message)
+        if stamp >= self._next_ns or stamp < self._next_ns - 10 * self._period_ns:
+            self._next_ns = stamp + self._period_ns
+            axes = axes_from_message(message)
+            operation = self._operations.at(stamp)
+            if operation is not None:
+                self._judge(operation, axes)
+
+    async def on_get(self, request: Any, response: Any) -> Any:
+        """Margin of a cut that may differ from the present one."""
+        operation = self._operations.at(self.get_clock().now().nanoseconds)
+        try:
+            if operation is None:
+                raise ValueError("no operation is loaded")
+            asked = (request.tool_speed, request.workpiece_speed, request.depth)
+            cut = with_cut(operation, *(None if np.isnan(value) else value for value in asked))
+            margin = await self._work(stability_margin, operation, cut)
+        except ValueError as error:
+            response.success, response.message = False, str(error)
+            return response
+        response.success = True
+        response.margin = margin_to_message(margin, self.get_clock().now().nanoseconds, operation.sha256, ros_types())
+        return response
+
+    async def _work(self, function: Any, *arguments: Any) -> Any:
+        """Result of a call in the worker; callbacks run meanwhile."""
+        told, executor = rclpy.task.Future(executor=self.executor), self.executor
+        job = self._worker.submit(function, *arguments)
+        job.add_done_callback(lambda _: (told.set_result(None), executor.wake()))
+        await told
+        return job.result()
+
+    def _judge(self, operation: Operation, axes: AxisState) -> None:
+        try:
+            cut = conditions_from_axes(operation, axes)
+            self._refused = ""
+        except ValueError as error:
+            self._refused = f"no prediction: {error}"
+            return
+        self._pending = [pending for pending in self._pending if not pending.done()]
+        if self._pending and not self._every:
+            self._left_out += 1
+        else:
+            self._pending.append(self._worker.submit(self._evaluate, operation, cut, axes.stamp_ns))
+
+    def _evaluate(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
+        """In the worker: the margin of a cut, computed anew only where the cut differs from the last one."""
+        key = grid(cut, operation, self._step)
+        last, self._last = self._last, None
+        try:
+            new = last is None or last[0] != key
+            point = stability_point(operation, cut) if new else last[1]
+            self._evaluated += new
+            settled, speeds = last is not None and last[0].at_speeds() == key.at_speeds(), key.at_speeds()
+            if settled and speeds not in self._limits:
+                self._publish(operation, self._margin(cut, point, key), stamp_ns)
+                self._limits[speeds] = stability_margin(operation, cut, speed_search=False)
+            chatter = point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP)
+            if not new and chatter and key not in self._speeds:
+                self._speeds[key] = nearest_stable_speed(operation, cut)
+            self._publish(operation, self._margin(cut, point, key), stamp_ns)
+            self._last = key, point
+            if settled:
+                self._draw(operation, cut, stamp_ns)
+        except ValueError as error:
+            self._refused = f"no prediction: {error}"
+
+    def _margin(self, cut: Conditions, point: StabilityPoint, key: Cut) -> Margin:
+        """Margin of a cut from its point and, where it is known, the depth limit at its speeds."""
+        found = self._limits.get(key.at_speeds())
+        intervals = found.stable_depths if found else np.empty((0, 2))
+        limit = depth_limit(intervals, cut.depth) if found else np.nan
+        chatter = point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP)
+        return Margin(
+            tool_speed=cut.tool_speed, workpiece_speed=cut.workpiece_speed, depth=cut.depth, depth_limit=limit,
+            stable_depths=intervals, depth_searched=found.depth_searched if found else np.nan,
+            depth_ratio=np.inf if limit == 0 else max(cut.depth, 0.0) / limit, spectral_radius=point.spectral_radius,
+            multipliers=point.multipliers, predicted_type=point.predicted_type, delay=point.delay,
+            chatter_frequency=point.chatter_frequency, principal_period=point.principal_period,
+            nearest_stable_speed=self._speeds.get(key, np.nan) if chatter else cut.tool_speed,
+            limit_type=found.limit_type if found else PredictedType.UNKNOWN,
+            limit_frequency=found.limit_frequency if found else np.nan)
+
+    def _publish(self, operation: Operation, margin: Margin, stamp_ns: int) -> None:
+        types = ros_types()
+        message = margin_to_message(margin, stamp_ns, operation.sha256, types)
+        support.send(self._out[topics.STABILITY_MARGIN], message)
+        for topic, value in zip(MARGIN_PLOTS, (margin.depth, margin.depth_ratio, margin.spectral_radius), strict=True):
+            support.send(self._out[topic], scalar_to_message(value, types))
+        self._sent += 1
+
+    def _draw(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
+        """In the worker: the stability diagram, once for each operation and settled workpiece speed."""
+        key = (operation.sha256, round(cut.workpiece_speed, 3))
+        if not self._lobe_points or key in self._drawn or not cut.in_cut:
+            return
+        self._drawn.add(key)
+        speeds = operation.conditions.tool_speed * np.linspace(0.7, 1.3, self._lobe_points)
+        depths = np.linspace(0.0, searched_depth(operation, cut), 13)[1:]
+        lobes = stability_lobes(operation, speeds, depths, cut.workpiece_speed)
+        support.send(self._out[topics.STABILITY_LOBES],
+                     lobes_to_message(lobes, stamp_ns, operation.sha256, ros_types()))
+
+    def _values(self) -> dict[str, object]:
+        return {"joint_states_received": self._received, "margins_sent": self._sent, "cuts_evaluated": self._evaluated,
+                "cuts_left_out": self._left_out, "cuts_waiting": sum(not pending.done() for pending in self._pending)}
+
+
+def grid(cut: Conditions, operation: Operation, change: float) -> Cut:
+    """The cut in steps of `change` relative to the operation: equal for cuts that differ less than a step."""
+    nominal, radius = operation.conditions, operation.tool.radius
+
+    def steps(value: float, scale: float) -> int:
+        return round(value / (change * abs(scale))) if scale else 0
+
+    return Cut(operation.sha256, steps(cut.tool_speed, nominal.tool_speed),
+               steps(cut.workpiece_speed, nominal.workpiece_speed), steps(max(cut.depth, 0.0), nominal.depth),
+               steps(cut.cross_feed_span[0], radius), steps(cut.cross_feed_span[1], radius))
+
+
+if __name__ == "__main__":
+    support.main(StabilityMonitor)
