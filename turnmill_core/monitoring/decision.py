@@ -1,0 +1,118 @@
+"""From the features of a window to a state, and from states to verdicts that hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from turnmill_core.monitoring.confidence import confidence
+from turnmill_core.monitoring.config import ChatterConfig
+from turnmill_core.monitoring.features import Features
+from turnmill_core.monitoring.gate import Background
+from turnmill_core.monitoring.verdict import ChatterKind, Reason
+from turnmill_core.prediction import PredictedType, Prior
+
+CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """State of one window by itself, and what it rests on."""
+
+    kind: ChatterKind
+    reason: Reason
+    text: str
+    asynchronous_ratio: float = math.nan
+    half_order_ratio: float = math.nan
+    confidence: float = 0.0
+
+
+def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, chattering: bool,
+          prior: Prior | None) -> Judgement:
+    """State of a window from its features; chattering: the leave thresholds apply instead of the enter thresholds."""
+    own = [x for x in f.lines if x.energy > 4 * background.line_energy(x)]
+    asynchronous = sum(x.energy for x in own)
+    total = asynchronous + f.synchronous + (f.half.energy if config.odd else 0.0)
+    ratio = asynchronous / total if total > 0 else 0.0
+    half = min(1.0, f.half.energy / f.synchronous) if f.synchronous > 0 else 0.0
+    if not cut:
+        return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
+                         ratio, half, confidence(f, ratio, half))
+    kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior)
+    return Judgement(kind, reason, text, ratio, half, confidence(f, ratio, half))
+
+
+def _cut(config: ChatterConfig, f: Features, background: Background, ratio: float, half: float,
+         chattering: bool, prior: Prior | None) -> tuple[ChatterKind, Reason, str]:
+    threshold = config.leave_ratio if chattering else config.enter_ratio
+    c = f.chatter
+    if c is not None and f.lines[0].energy > 4 * background.line_energy(f.lines[0]):
+        share = c.energy / (c.energy + f.synchronous)
+        evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
+        if evident and share > threshold:
+            return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
+                    f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.teeth:.1f} Hz hold "
+                    f"{100 * share:.0f} % of the energy")
+        if evident and share > config.leave_ratio:
+            return (ChatterKind.MARGINAL, Reason.ASYNCHRONOUS,
+                    f"lines at {c.frequency:.1f} Hz hold {100 * share:.1f} % of the energy")
+    if half > threshold and _dominates(config, f):
+        return _half_order(config, half, prior)
+    return ChatterKind.STABLE, Reason.SYNCHRONOUS, f"{100 * (1 - ratio):.1f} % of the energy is synchronous"
+
+
+def _dominates(config: ChatterConfig, f: Features) -> bool:
+    """True where half-order lines are more than the runout lines between tooth passing harmonics.
+
+    Eccentricity gives lines at every multiple of the spindle frequency, flip chatter only at odd
+    multiples of half the tooth passing frequency.
+    """
+    if config.odd:
+        return f.half.energy > sum(x.energy for x in f.lines)
+    return f.half.energy > f.synchronous - f.tooth - f.half.energy
+
+
+def _half_order(config: ChatterConfig, half: float, prior: Prior | None) -> tuple[ChatterKind, Reason, str]:
+    text = f"lines at odd multiples of half the tooth passing frequency, {100 * half:.0f} % of the synchronous energy"
+    if config.odd:
+        return ChatterKind.FLIP, Reason.HALF_ORDER, text
+    if prior is None or prior.predicted_type in (PredictedType.UNKNOWN, PredictedType.NO_CUT):
+        return ChatterKind.FLIP_OR_RUNOUT, Reason.NO_PRIOR, text + "; flip or runout: no prediction"
+    if prior.predicted_type is PredictedType.FLIP:
+        return ChatterKind.FLIP, Reason.PRIOR_FLIP, text + "; predicted: flip"
+    return ChatterKind.STABLE, Reason.PRIOR_RUNOUT, text + "; not predicted to flip: runout"
+
+
+@dataclass(frozen=True)
+class Held:
+    """State that the monitor holds, the one that would replace it, and for how many windows it has been seen."""
+
+    kind: ChatterKind = ChatterKind.UNKNOWN
+    rival: ChatterKind = ChatterKind.UNKNOWN
+    count: int = 0
+
+
+def persist(config: ChatterConfig, held: Held, kind: ChatterKind, plain: bool) -> Held:
+    """Held state after a window judged `kind`: a change needs its dwell of windows in a row that agree.
+
+    Chatter must last longer where no plain comb shows the cut by itself (lone_dwell): entry into the cut
+    and other passing machine sounds can look like a family for some tenths of a second.
+    """
+    if kind == held.kind:
+        return Held(kind, kind, 0)
+    if kind is ChatterKind.UNKNOWN:
+        return Held()
+    count = held.count + 1 if kind == held.rival or (kind in CHATTER and held.rival in CHATTER) else 1
+    if count >= _dwell(config, held.kind, kind, plain):
+        return Held(kind, kind, 0)
+    return Held(held.kind, kind, count)
+
+
+def _dwell(config: ChatterConfig, old: ChatterKind, new: ChatterKind, plain: bool) -> int:
+    if new in CHATTER:
+        return config.enter_dwell if plain or old in CHATTER else config.lone_dwell
+    if old in CHATTER:
+        return config.leave_dwell
+    if ChatterKind.AIR in (old, new) and old is not ChatterKind.UNKNOWN:
+        return config.cut_dwell
+    return 1

@@ -1,0 +1,198 @@
+"""What one window shows: synchronous and half-order energy, asynchronous lines, the chatter family."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnmill_core.monitoring.separation import (
+    Layout,
+    Prepared,
+    Synchronous,
+    harmonic_noise,
+    lay_out,
+    sinusoids,
+    speed_error,
+    synchronous,
+    uniform_in_time,
+)
+from turnmill_core.monitoring.spectrum import Array, Line, Spectrum, family, lines, near, spectrum
+
+LINE_RATIO = 16.0
+"""A peak counts as a line above this power over the floor: noise alone passes it once in about 500 windows."""
+
+STRONG = 0.02
+"""Asynchronous lines above this share of the energy are taken out before the synchronous part is averaged."""
+
+
+@dataclass(frozen=True)
+class ChatterFamily:
+    """Lines at H + i f_tooth.
+
+    frequency: H, the strongest [Hz]; energy: mean square of all lines; sidebands: lines found next
+    to H at a distance of one or two tooth passing frequencies; explained: share of the energy of all
+    asynchronous lines in lines at m H + i f_spindle; members [Hz], ascending.
+    """
+
+    frequency: float
+    energy: float
+    sidebands: int
+    explained: float
+    members: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class HalfOrder:
+    """Lines at odd multiples of half the tooth passing frequency: energy, strongest and all lines [Hz]."""
+
+    energy: float
+    frequency: float = math.nan
+    members: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Features:
+    """Energies are mean squares over the window (Hann-squared weights), above noise.
+
+    frequency: spindle frequency [Hz]; speed_ratio: refined over assumed speed; tooth: energy at
+    tooth passing harmonics; synchronous: at all spindle harmonics; half: half-order lines; comb:
+    number of tooth passing harmonics above the noise, of comb_of looked at; noise: broadband
+    energy; energy: all energy in the band; lines: asynchronous lines, strongest first; chatter: the
+    family of the strongest, if any.
+    """
+
+    frequency: float
+    speed_ratio: float
+    tooth: float
+    synchronous: float
+    half: HalfOrder
+    comb: int
+    comb_of: int
+    noise: float
+    energy: float
+    lines: tuple[Line, ...]
+    chatter: ChatterFamily | None
+
+
+@dataclass(frozen=True)
+class _Parts:
+    layout: Layout
+    values: Array
+    one: Synchronous
+    residual: Spectrum
+
+
+def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
+             band: tuple[float, float]) -> Features:
+    """Features of a window.
+
+    turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
+    [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`.
+    """
+    parts = _separate(p, turns * ratio, steady, teeth, lowest)
+    better = float(np.clip(ratio * (1 + _speed_error(parts, p, teeth)), *band))
+    if abs(better / ratio - 1) * parts.layout.revolutions * teeth > 0.004:
+        ratio = better
+        parts = _separate(p, turns * ratio, steady, teeth, lowest)
+    layout, found = parts.layout, parts.residual
+    tooth_frequency = teeth * layout.frequency
+    noise = harmonic_noise(found, len(parts.one.mean), layout.frequency, 1, layout.duration)
+    energy = parts.one.energy()
+    order = np.arange(len(energy))
+    inside = (order * layout.frequency >= min(lowest, 0.4 * tooth_frequency)) & (order * layout.frequency <= p.top)
+    clear = np.where(inside & (energy > 4 * noise), energy - noise, 0.0)
+    tooth = order % teeth == 0
+    first = np.flatnonzero(tooth & inside)[:12]
+    asynchronous = lines(found, lowest, LINE_RATIO, 24)
+    if teeth % 2:
+        half = _half_odd(parts, p.top, teeth)
+        asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))
+    else:
+        half = _half(np.arange(teeth // 2, len(clear), teeth) * layout.frequency, clear[teeth // 2:: teeth])
+    low = int(lowest / found.step)
+    noise_energy = float(found.floor[low:].sum())
+    return Features(
+        layout.frequency, ratio, float(clear[tooth].sum()), float(clear.sum()), half,
+        int(np.sum(energy[first] > 10 * noise[first])), len(first), noise_energy,
+        float(found.power[low:].sum() + energy[inside].sum()), asynchronous,
+        _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest),
+    )
+
+
+def _separate(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float) -> _Parts:
+    """Synchronous part without the leakage of strong asynchronous lines, and the spectrum of what is left."""
+    layout = lay_out(p, turns, 1 if teeth % 2 == 0 else 2)
+    one = synchronous(layout, layout.values, 1)
+    residual = _residual(layout, one, p, steady)
+    least = STRONG * (residual.power.sum() + one.energy().sum())
+    harmonic = layout.frequency / (2 if teeth % 2 else 1)
+    strong = [x.frequency for x in lines(residual, lowest, 4 * LINE_RATIO, 6)
+              if x.energy > least and _distance(x.frequency / harmonic) * harmonic * layout.duration > 1]
+    if not strong:
+        return _Parts(layout, layout.values, one, residual)
+    values = layout.values - sinusoids(layout, layout.values, strong)
+    one = synchronous(layout, values, 1)
+    return _Parts(layout, values, one, _residual(layout, one, p, steady))
+
+
+def _residual(layout: Layout, one: Synchronous, p: Prepared, steady: bool) -> Spectrum:
+    values = layout.values - one.wave
+    if steady:
+        return spectrum(values, layout.points * layout.frequency, p.top)
+    return spectrum(*uniform_in_time(layout, values, p.rate), p.top)
+
+
+def _distance(x: float) -> float:
+    return abs(x - round(x))
+
+
+def _speed_error(parts: _Parts, p: Prepared, teeth: int) -> float:
+    noise = harmonic_noise(parts.residual, len(parts.one.mean), parts.layout.frequency, 1, parts.layout.duration)
+    harmonics = np.arange(teeth, min(len(parts.one.mean), int(p.top / parts.layout.frequency)), teeth)
+    return speed_error(parts.one, harmonics, noise[harmonics])
+
+
+def _half_odd(parts: _Parts, top: float, teeth: int) -> HalfOrder:
+    layout = parts.layout
+    two = synchronous(layout, parts.values, 2)
+    noise = harmonic_noise(parts.residual, len(two.mean), layout.frequency, 2, layout.duration)
+    energy = two.energy()
+    at = np.arange(teeth, min(len(energy), int(2 * top / layout.frequency)), 2 * teeth)
+    return _half(at * layout.frequency / 2, np.where(energy[at] > 4 * noise[at], energy[at] - noise[at], 0.0))
+
+
+def _half(frequencies: Array, energy: Array) -> HalfOrder:
+    seen = np.flatnonzero(energy > 0)
+    if not len(seen):
+        return HalfOrder(0.0)
+    return HalfOrder(float(energy.sum()), float(frequencies[np.argmax(energy)]), tuple(frequencies[seen].tolist()))
+
+
+def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> bool:
+    return _distance(frequency / tooth_frequency - 0.5) * tooth_frequency < 0.5 * s.resolution
+
+
+def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spindle_frequency: float,
+             lowest: float) -> ChatterFamily | None:
+    """Family of the strongest line, or None without lines."""
+    if not found:
+        return None
+    strongest = found[0].frequency
+    top = (len(s.power) - 1) * s.step
+    tolerance = 1.2 * s.resolution
+    members = family(strongest, tooth_frequency, top)
+    members = members[members >= lowest]
+    explained = np.concatenate([family(m * strongest, spindle_frequency, top) for m in (1, 2, 3)])
+
+    def belongs(x: Line, where: Array) -> bool:
+        return bool(np.min(np.abs(where - x.frequency), initial=math.inf) <= tolerance)
+
+    own = [x for x in found if belongs(x, members)]
+    total = sum(x.energy for x in found)
+    next_to = np.abs(strongest + tooth_frequency * np.array([-2, -1, 1, 2]))
+    sidebands = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
+    return ChatterFamily(strongest, sum(x.energy for x in own), int(sidebands.sum()),
+                         sum(x.energy for x in found if belongs(x, explained)) / total if total > 0 else 0.0,
+                         tuple(sorted(x.frequency for x in own)))

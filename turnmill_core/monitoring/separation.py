@@ -1,0 +1,187 @@
+"""Synchronous and asynchronous parts of a window.
+
+A window is laid out by angle: one row per revolution, one column per angle. Per column the mean and
+the linear trend over the revolutions are the synchronous part (synchronous averaging, with a trend
+for a cut that grows); the rest is asynchronous. Half-order lines of a tool with an odd number of
+teeth lie midway between spindle harmonics: there the averaging runs over two revolutions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage, signal
+
+from turnmill_core.monitoring.spectrum import Array, Spectrum
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Window at a rate suited to the band: samples (mean removed), rate [Hz], top of the band [Hz]."""
+
+    samples: Array
+    rate: float
+    top: float
+
+
+def prepare(x: Array, rate: float, top: float) -> Prepared:
+    """Window resampled to at least four times its highest judged frequency (`top`, at most 0.45 rate)."""
+    top = min(top, 0.45 * rate)
+    x = x - x.mean()
+    if rate >= 8 * top:
+        down = int(rate / (4 * top))
+        return Prepared(signal.resample_poly(x, 1, down, window=_low_pass(1, down)), rate / down, top)
+    if rate < 4 * top:
+        up = math.ceil(4 * top / rate)
+        return Prepared(signal.resample_poly(x, up, 1, window=_low_pass(up, 1)), rate * up, top)
+    return Prepared(x, rate, top)
+
+
+@lru_cache(maxsize=16)
+def _low_pass(up: int, down: int) -> Array:
+    """Filter of a resampling: Kaiser window, 10 periods of the slower rate on either side."""
+    widest = max(up, down)
+    taps: Array = signal.firwin(20 * widest + 1, 1 / widest, window=("kaiser", 5.0)) if widest > 1 else np.ones(1)
+    taps.flags.writeable = False
+    return taps
+
+
+def resampled_turns(turns: Array, count: int, ratio: float) -> Array:
+    """Revolutions at `count` samples taken at `ratio` times the rate of `turns`."""
+    at = np.arange(count) / ratio
+    inside = np.minimum(at, len(turns) - 1.0)
+    found: Array = np.interp(inside, np.arange(len(turns)), turns) + (at - inside) * (turns[-1] - turns[-2])
+    return found
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The newest whole revolutions of a window, by angle.
+
+    frequency [Hz]: mean spindle frequency; values: one per angle step, `points` a revolution,
+    oldest first; times [s] of the values since the window's first sample.
+    """
+
+    frequency: float
+    revolutions: int
+    points: int
+    values: Array
+    times: Array
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return self.revolutions / self.frequency
+
+
+def lay_out(p: Prepared, turns: Array, multiple: int) -> Layout:
+    """Window by angle; turns: revolutions of the tool at every sample, ascending.
+
+    The revolutions kept are a whole `multiple`. Raises ValueError where the window holds fewer than
+    three multiples.
+    """
+    total = float(turns[-1] - turns[0])
+    revolutions = int(total / multiple + 1e-9) * multiple
+    if revolutions < 3 * multiple:
+        raise ValueError(f"window holds {total:.3g} revolutions, expected at least {3 * multiple}")
+    frequency = total * p.rate / (len(turns) - 1)
+    points = fft.next_fast_len(math.ceil(p.rate / frequency), real=True)
+    angle = turns[-1] - revolutions + (np.arange(revolutions * points) + 1) / points
+    index = np.interp(angle, turns, np.arange(len(turns)))
+    values = ndimage.map_coordinates(p.samples, index[None, :], order=3, mode="nearest")
+    return Layout(frequency, revolutions, points, values, index / p.rate)
+
+
+@dataclass(frozen=True)
+class Synchronous:
+    """Part of a window that repeats every `period` revolutions.
+
+    wave: its values in the order of the layout; mean, trend: complex amplitudes at multiples 0, 1,
+    2 ... of the spindle frequency over `period`, and their change per revolution; the peak
+    amplitude of a harmonic is |mean|; rows: number of periods averaged.
+    """
+
+    period: int
+    rows: int
+    wave: Array
+    mean: Array
+    trend: Array
+
+    def energy(self) -> Array:
+        """Mean square of every harmonic with its trend, in the weights of a Spectrum (Hann squared)."""
+        at = (np.arange(self.rows) - (self.rows - 1) / 2) * self.period
+        w = np.sin(math.pi * (np.arange(self.rows) + 0.5) / self.rows) ** 4
+        spread = float(np.sum(w * at**2) / np.sum(w))
+        found: Array = (np.abs(self.mean) ** 2 + spread * np.abs(self.trend) ** 2) / 2
+        found[0] = 0.0
+        return found
+
+
+def synchronous(layout: Layout, values: Array, period: int) -> Synchronous:
+    """Synchronous part of `values` (laid out like `layout`) over `period` revolutions, with linear trend."""
+    table = values.reshape(layout.revolutions // period, period * layout.points)
+    rows = (np.arange(len(table)) - (len(table) - 1) / 2) * period
+    mean = table.mean(axis=0)
+    trend = (rows @ table) / (rows @ rows)
+    scale = 2 / (period * layout.points)
+    return Synchronous(period, len(table), (mean + rows[:, None] * trend).ravel(),
+                       fft.rfft(mean) * scale, fft.rfft(trend) * scale)
+
+
+def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Array:
+    """Part of `values` in sinusoids whose amplitudes change linearly (least squares), one at each frequency [Hz].
+
+    A strong asynchronous line that is left in leaks into the averages over the revolutions.
+    """
+    if not frequencies:
+        return np.zeros_like(values)
+    wave = np.exp(2j * math.pi * np.outer(frequencies, layout.times))
+    ramp = np.linspace(-1.0, 1.0, len(values))
+    columns = np.concatenate([wave.real, wave.imag, wave.real * ramp, wave.imag * ramp])
+    gram = columns @ columns.T
+    gram[np.diag_indices(len(gram))] *= 1 + 1e-9
+    found: Array = np.linalg.solve(gram, columns @ values) @ columns
+    return found
+
+
+def speed_error(s: Synchronous, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
+    """Relative error of the assumed speed: true speed = assumed (1 + error).
+
+    A wrong speed turns the phase of harmonic h by 2 pi h error each revolution, which shows as a
+    trend in quadrature to the mean. harmonics: indices into mean and trend; noise: mean square
+    that noise alone gives each. Weighted median over the harmonics above ten times the noise (weight:
+    the order, a line near one harmonic moves it little); 0 without any.
+    """
+    a, b = s.mean[harmonics], s.trend[harmonics]
+    power = np.abs(a) ** 2
+    use = power > 20 * noise
+    if not use.any():
+        return 0.0
+    order = harmonics[use] / s.period
+    errors = np.imag(np.conj(a[use]) * b[use]) / (2 * math.pi * order * power[use])
+    weight = order * np.minimum(1.0, np.sqrt(power[use] / np.median(power[use])))
+    ascending = np.argsort(errors, kind="stable")
+    passed = np.cumsum(weight[ascending])
+    return float(errors[ascending][np.searchsorted(passed, passed[-1] / 2)])
+
+
+def uniform_in_time(layout: Layout, values: Array, rate: float) -> tuple[Array, float]:
+    """`values` at uniform steps of time and their rate [Hz], for a window in which the speed changes."""
+    times = np.arange(layout.times[0], layout.times[-1], 1 / rate)
+    index = np.interp(times, layout.times, np.arange(len(values)))
+    found: Array = ndimage.map_coordinates(values, index[None, :], order=3, mode="nearest")
+    return found, rate
+
+
+def harmonic_noise(floor: Spectrum, count: int, frequency: float, period: int, duration: float) -> Array:
+    """Mean square that broadband noise gives to each fitted harmonic (mean and trend), from a noise floor."""
+    at = np.arange(count) * frequency / period
+    density = np.interp(at, floor.frequency, floor.floor / floor.step, right=0.0)
+    noise: Array = 1.5 * density / duration
+    return noise

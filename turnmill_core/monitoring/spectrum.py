@@ -1,0 +1,131 @@
+"""Windowed spectra, their noise floor, lines and line families."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal
+
+Array = NDArray[np.floating[Any]]
+
+PAD = 2
+"""Zero padding of every spectrum: bins per reciprocal window length."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided power spectrum of a Hann window.
+
+    step [Hz] between bins; power: mean square of the weighted signal per bin (the sum over all
+    bins is the mean square of the signal with weights w^2 / sum w^2); floor: mean noise power per
+    bin, from medians, which lines hardly move; resolution [Hz] = 1 / window length.
+    """
+
+    step: float
+    power: Array
+    floor: Array
+
+    @property
+    def resolution(self) -> float:
+        """Reciprocal of the window length [Hz]."""
+        return self.step * PAD
+
+    @property
+    def frequency(self) -> Array:
+        """Frequency of every bin [Hz]."""
+        return np.arange(len(self.power)) * self.step
+
+
+@dataclass(frozen=True)
+class Line:
+    """A narrow peak: frequency [Hz], mean square of its sinusoid above the floor, power over floor [1]."""
+
+    frequency: float
+    energy: float
+    ratio: float
+
+
+@lru_cache(maxsize=32)
+def _hann(count: int) -> Array:
+    w = signal.windows.hann(count, sym=False)
+    w.flags.writeable = False
+    return np.asarray(w, dtype=np.float64)
+
+
+def spectrum(x: Array, rate: float, top: float) -> Spectrum:
+    """Power spectrum of `x` (samples at `rate` Hz, mean removed) from 0 to `top` [Hz]."""
+    w = _hann(len(x))
+    count = fft.next_fast_len(PAD * len(x), real=True)
+    step = rate / count
+    keep = min(count // 2, int(top / step)) + 1
+    amplitude = fft.rfft((x - x.mean()) * w, count)[:keep]
+    power = (amplitude.real**2 + amplitude.imag**2) * (2 / (count * (w @ w)))
+    return Spectrum(rate / count, power, noise_floor(power, max(8, round(40 * count / len(x)))))
+
+
+def noise_floor(power: Array, block: int) -> Array:
+    """Mean noise power per bin: medians over blocks of bins, over ln 2, joined by straight lines."""
+    blocks = max(1, len(power) // block)
+    medians = np.median(power[: blocks * block].reshape(blocks, -1), axis=1) if len(power) >= block \
+        else np.array([np.median(power)])
+    centres = (np.arange(len(medians)) + 0.5) * block
+    floor: Array = np.interp(np.arange(len(power)), centres, medians) / np.log(2)
+    return np.maximum(floor, np.finfo(float).tiny)
+
+
+def lines(s: Spectrum, lowest: float, ratio: float, most: int) -> tuple[Line, ...]:
+    """The `most` strongest peaks above `lowest` [Hz] whose power is over `ratio` times the floor, strongest first.
+
+    Frequency by a parabola through the logarithm of three bins (bias below 0.02 bins for Hann);
+    energy from the main lobe, less the floor in it.
+    """
+    p = s.power
+    lobe = 2 * PAD
+    inner = p[1:-1]
+    at = 1 + np.flatnonzero((inner > p[:-2]) & (inner >= p[2:]) & (inner > ratio * s.floor[1:-1]))
+    at = at[at * s.step >= lowest]
+    at = at[np.argsort(-p[at], kind="stable")]
+    found: list[Line] = []
+    taken = np.zeros(len(p), dtype=bool)
+    for k in at:
+        if taken[k]:
+            continue
+        low, high = max(0, k - lobe), min(len(p), k + lobe + 1)
+        free = ~taken[low:high]
+        energy = float(np.sum((p[low:high] - s.floor[low:high])[free]))
+        taken[low:high] = True
+        found.append(Line(peak(s, int(k)), max(energy, 0.0), float(p[k] / s.floor[k])))
+        if len(found) == most:
+            break
+    return tuple(found)
+
+
+def peak(s: Spectrum, k: int) -> float:
+    """Frequency of the peak at bin `k` [Hz], by a parabola through the logarithm of three bins."""
+    if not 0 < k < len(s.power) - 1:
+        return k * s.step
+    a, b, c = np.log(np.maximum(s.power[k - 1: k + 2], np.finfo(float).tiny))
+    bend = a - 2 * b + c
+    shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
+    return float((k + min(0.5, max(-0.5, shift))) * s.step)
+
+
+def near(values: Array, s: Spectrum, frequencies: Array, tolerance: float) -> Array:
+    """Largest of `values` (one per bin) within `tolerance` [Hz] of each frequency; 0 outside the spectrum."""
+    reach = max(0, round(tolerance / s.step))
+    at = np.rint(np.asarray(frequencies) / s.step).astype(int)
+    inside = (at >= reach) & (at < len(values) - reach)
+    index = np.where(inside, at, reach)[..., None] + np.arange(-reach, reach + 1)
+    found: Array = np.where(inside, values[np.minimum(index, len(values) - 1)].max(axis=-1), 0.0)
+    return found
+
+
+def family(first: float, spacing: float, top: float) -> Array:
+    """Frequencies |first + i spacing| up to `top` [Hz], ascending: a line, its sidebands and their mirror images."""
+    up = np.arange(-np.floor((top + first) / spacing), np.floor((top - first) / spacing) + 1)
+    found: Array = np.unique(np.abs(first + up * spacing))
+    return found

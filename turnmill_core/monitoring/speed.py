@@ -1,0 +1,152 @@
+"""Spindle speed over a window: from axis states, and refined from the signal."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnmill_core.monitoring.spectrum import Array, Spectrum
+
+MEMORY_NS = 10_000_000_000
+"""Spindle speeds older than this before the newest one are forgotten [ns]."""
+
+
+@dataclass(frozen=True)
+class SpindleSpeed:
+    """Speed of the tool spindle [rad/s] at an instant [ns], from an axis state or a tachometer."""
+
+    stamp_ns: int
+    speed: float
+
+
+def remember(held: tuple[SpindleSpeed, ...], item: SpindleSpeed) -> tuple[SpindleSpeed, ...]:
+    """Speeds in order of stamp with `item` (magnitude); left out: one not newer than the newest, or not finite."""
+    item = SpindleSpeed(item.stamp_ns, abs(item.speed))
+    if not math.isfinite(item.speed) or (held and item.stamp_ns <= held[-1].stamp_ns):
+        return held
+    drop = 0
+    while drop < len(held) and held[drop].stamp_ns < item.stamp_ns - MEMORY_NS:
+        drop += 1
+    return (*held[drop:], item)
+
+
+def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int) -> float:
+    """Speed at an instant [rad/s], linear between its neighbours; NaN without neighbours within `longest_gap_ns`."""
+    for later, earlier in zip(reversed(held), reversed(held[:-1]), strict=False):
+        if earlier.stamp_ns <= stamp_ns <= later.stamp_ns:
+            if later.stamp_ns - earlier.stamp_ns > longest_gap_ns:
+                return math.nan
+            part = (stamp_ns - earlier.stamp_ns) / (later.stamp_ns - earlier.stamp_ns)
+            return earlier.speed + part * (later.speed - earlier.speed)
+    return math.nan
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Rotation of the tool over a window.
+
+    turns: revolutions since the window's first sample, one per sample; mean [rad/s]: average
+    speed; spread: largest difference of the speed from its mean, relative.
+    """
+
+    turns: Array
+    mean: float
+    spread: float
+
+
+def constant_rotation(speed: float, count: int, rate: float) -> Rotation:
+    """Rotation at a constant speed [rad/s] over `count` samples at `rate` [Hz]."""
+    return Rotation(np.arange(count) * (speed / (2 * math.pi * rate)), speed, 0.0)
+
+
+def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: int, rate: float,
+             longest_gap_ns: int) -> Rotation | None:
+    """Rotation over the window whose first and last samples have stamps start_ns and end_ns.
+
+    The speed is linear between the held values, its integral exact; None where they do not cover
+    the window or lie further apart than `longest_gap_ns`.
+    """
+    first = next((i for i in range(len(held) - 1, -1, -1) if held[i].stamp_ns <= start_ns), -1)
+    last = next((i for i in range(len(held)) if held[i].stamp_ns >= end_ns), -1)
+    if first < 0 or last < 0:
+        return None
+    used = held[first: max(last, first + 1) + 1]
+    if len(used) < 2:
+        return constant_rotation(used[0].speed, count, rate)
+    stamps = np.array([h.stamp_ns - start_ns for h in used], dtype=np.int64)
+    if np.diff(stamps).max() > longest_gap_ns:
+        return None
+    at = stamps.astype(np.float64) * 1e-9
+    speed = np.array([h.speed for h in used])
+    times = np.arange(count) / rate
+    values = np.interp(times, at, speed)
+    mean = float(values.mean())
+    if mean <= 0:
+        return Rotation(np.zeros(count), mean, 0.0)
+    spread = float(np.abs(values - mean).max() / mean)
+    if spread < 1e-5:
+        return constant_rotation(mean, count, rate)
+    slope = np.diff(speed) / np.diff(at)
+    angle = np.concatenate([[0.0], np.cumsum(np.diff(at) * (speed[1:] + speed[:-1]) / 2)])
+    k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(slope) - 1)
+    since = times - at[k]
+    theta = angle[k] + since * (speed[k] + slope[k] * since / 2)
+    return Rotation((theta - theta[0]) / (2 * math.pi), mean, spread)
+
+
+def ratio_grid(band: float, step: float = 2.5e-4) -> Array:
+    """Trial ratios of true to declared speed: 1 - band ... 1 + band."""
+    half = max(1, math.ceil(band / step))
+    return 1 + np.linspace(-band, band, 2 * half + 1)
+
+
+def comb_score(s: Spectrum, tooth_frequency: float, ratios: Array, top: float = 2500.0, most: int = 20) -> Array:
+    """Evidence of a tooth passing comb at each trial ratio: mean over harmonics of log(1 + power/floor).
+
+    Each harmonic's share is bounded (power/floor counts up to 1000), so that one strong line which
+    is no harmonic cannot pull the comb onto itself.
+    """
+    count = max(1, min(most, int(min(top, len(s.power) * s.step * 0.95) / (tooth_frequency * ratios[-1]))))
+    harmonics = np.arange(1, count + 1)
+    position = np.outer(ratios, harmonics) * (tooth_frequency / s.step)
+    low = np.clip(position.astype(int), 0, len(s.power) - 2)
+    part = position - low
+    excess = np.log1p(np.minimum(s.power / s.floor, 1000.0))
+    score: Array = (excess[low] * (1 - part) + excess[low + 1] * part).mean(axis=1)
+    return score
+
+
+def best_ratio(ratios: Array, scores: Array) -> tuple[float, float]:
+    """Ratio of the highest score (parabola through its neighbours) and the score's lead over the median one."""
+    k = int(np.argmax(scores))
+    lead = float(scores[k] - np.median(scores))
+    if not 0 < k < len(scores) - 1:
+        return float(ratios[k]), lead
+    a, b, c = scores[k - 1: k + 2]
+    bend = a - 2 * b + c
+    shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
+    return float(ratios[k] + shift * (ratios[1] - ratios[0])), lead
+
+
+def family_score(s: Spectrum, strongest: float, spindle_frequency: float, teeth: int, ratios: Array) -> Array:
+    """Evidence of lines spaced by the tooth passing and the spindle frequency around the strongest line.
+
+    Works for a tooth passing harmonic and for a chatter line alike, where the comb itself may
+    lie below the noise: chatter at H shows H + i f_tooth whatever H is. Mean of log(1 + power/floor)
+    over i = -2 ... 2 tooth passing frequencies, twice, and over i = -2 N ... 2 N spindle
+    frequencies, four times; the strongest line itself does not count.
+    """
+    excess = np.log1p(np.minimum(s.power / s.floor, 1000.0))
+    excess[np.abs(np.arange(len(excess)) * s.step - strongest) < 2.5 * s.resolution] = 0.0
+    total = np.zeros(len(ratios))
+    for spacing, reach, weight in ((teeth * spindle_frequency, 2, 2.0), (spindle_frequency, 2 * teeth, 4.0)):
+        i = np.concatenate([np.arange(-reach, 0), np.arange(1, reach + 1)])
+        position = np.abs(strongest + np.outer(ratios, i) * spacing) / s.step
+        inside = position < len(excess) - 2
+        low = np.minimum(position, len(excess) - 2).astype(int)
+        part = position - low
+        value = np.where(inside, excess[low] * (1 - part) + excess[low + 1] * part, 0.0)
+        total += weight * value.sum(axis=1) / np.maximum(inside.sum(axis=1), 1)
+    return total

@@ -1,0 +1,187 @@
+"""Judgement of one window: length, channel, speed, features, state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.monitoring import stream as streams
+from turnmill_core.monitoring.blocks import Status
+from turnmill_core.monitoring.config import ChatterConfig
+from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist
+from turnmill_core.monitoring.features import Features, features
+from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
+from turnmill_core.monitoring.separation import prepare, resampled_turns
+from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
+from turnmill_core.monitoring.speed import (
+    Rotation,
+    SpindleSpeed,
+    best_ratio,
+    comb_score,
+    constant_rotation,
+    family_score,
+    ratio_grid,
+    rotation,
+    speed_at,
+)
+from turnmill_core.monitoring.stream import Stream
+from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
+from turnmill_core.prediction import Prior
+
+LARGEST_SPREAD = 0.1
+"""Relative change of the spindle speed from its mean inside a window that is still followed."""
+
+FEWEST_REVOLUTIONS = 6
+SCORE_MEMORY = 0.9
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """What is carried from window to window of one device: held state, background, scores of speed
+    ratios on their grid, and the newest ratio of true to assumed speed."""
+
+    held: Held = field(default_factory=Held)
+    background: Background = field(default_factory=Background)
+    scores: Array | None = None
+    ratio: float = 1.0
+
+
+def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
+                 prior: Prior | None) -> tuple[Tracker, Verdict]:
+    """Verdict on the window that ends before sample `end`, and the tracker after it."""
+    gap_ns = round(config.speed_timeout * 1e9)
+    end_speed = speed_at(speeds, s.stamp(end - 1), gap_ns)
+    source = SpeedSource.AXIS
+    if not math.isfinite(end_speed):
+        end_speed, source = config.nominal_speed, SpeedSource.NOMINAL
+    seconds = config.window
+    if end_speed > 0:
+        seconds = min(config.longest_window, max(seconds, config.revolutions * 2 * math.pi / end_speed))
+    start = end - max(2, round(seconds * s.sample_rate))
+    blank = Verdict(s.stamp(max(start, s.origin)), s.stamp(end - 1), end - 1, s.device, s.stream_id, "",
+                    ChatterKind.UNKNOWN, Reason.NONE, "", spindle_speed=end_speed if end_speed > 0 else math.nan,
+                    spindle_speed_source=source, prior=prior)
+
+    reason, text = streams.trouble(s, start, end)
+    if reason is not Reason.NONE:
+        return _unknown(tracker, blank, reason, text)
+    channel, x, reason, text = _choose_channel(config, s, start, end)
+    blank = replace(blank, channel=s.channels[channel].name)
+    if reason is not Reason.NONE:
+        return _unknown(tracker, blank, reason, text)
+    level = float(x.std())
+    blank = replace(blank, level=level)
+    if end_speed <= 0 or seconds * end_speed < FEWEST_REVOLUTIONS * 2 * math.pi:
+        return _unknown(tracker, blank, Reason.NO_SPEED, "the spindle stands still, is too slow for a window, or its "
+                        "speed is unknown")
+    turned = rotation(speeds, s.stamp(start), s.stamp(end - 1), len(x), s.sample_rate, gap_ns)
+    if turned is None:
+        turned, source = constant_rotation(config.nominal_speed, len(x), s.sample_rate), SpeedSource.NOMINAL
+    if config.nominal_speed <= 0 and source is SpeedSource.NOMINAL:
+        return _unknown(tracker, blank, Reason.NO_SPEED,
+                        "no axis state covers the window and no nominal speed is known")
+    if turned.spread > LARGEST_SPREAD:
+        return _unknown(tracker, blank, Reason.SPEED_CHANGING,
+                        f"the spindle speed differs by up to {100 * turned.spread:.0f} % from its mean")
+    return _judge_samples(config, tracker, replace(blank, spindle_speed_source=source), x, s.sample_rate, turned, prior)
+
+
+def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tuple[Tracker, Verdict]:
+    return replace(tracker, held=Held()), replace(blank, reason=reason, reason_text=text)
+
+
+def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
+                   prior: Prior | None) -> tuple[Tracker, Verdict]:
+    p = prepare(x, rate, config.band[1])
+    turns = resampled_turns(turned.turns, len(p.samples), p.rate / rate)
+    steady = turned.spread < 1e-5
+    whole = spectrum(p.samples, p.rate, p.top)
+    scores, ratio = tracker.scores, tracker.ratio
+    band = (1 - config.axis_band, 1 + config.axis_band)
+    if blank.spindle_speed_source is SpeedSource.NOMINAL:
+        grid = ratio_grid(config.nominal_band)
+        new = _ratio_scores(config, whole, turned.mean / (2 * math.pi), grid)
+        scores = new if scores is None else SCORE_MEMORY * scores + (1 - SCORE_MEMORY) * new
+        ratio, _ = best_ratio(grid, scores)
+        band = (ratio - 2e-3, ratio + 2e-3)
+    ratio = min(band[1], max(band[0], ratio))
+    f = features(p, turns, steady, config.teeth, config.band[0], ratio, band)
+    chattering = tracker.held.kind in CHATTER
+    cut = in_cut(config, f, tracker.background, chattering)
+    judgement = judge(config, f, tracker.background, cut, chattering, prior)
+    held = persist(config, tracker.held, judgement.kind, plain_comb(f))
+    background = tracker.background
+    if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
+        background = learn(background, f, whole)
+    verdict = _verdict(config, blank, f, judgement, held)
+    return Tracker(held, background, scores, f.speed_ratio), verdict
+
+
+def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
+    """Evidence for each ratio of true to nominal speed; large departures need more of it."""
+    scores = comb_score(whole, config.teeth * frequency, grid)
+    strongest = lines(whole, config.band[0], 100.0, 1)
+    if strongest:
+        scores = scores + family_score(whole, strongest[0].frequency, frequency, config.teeth, grid)
+    found: Array = scores - 0.3 * ((grid - 1) / config.nominal_band) ** 2
+    return found
+
+
+def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judgement, held: Held) -> Verdict:
+    reason, text = judgement.reason, judgement.text
+    if held.kind != judgement.kind:
+        reason, text = Reason.PERSISTENCE, f"held; this window by itself: {judgement.kind.name.lower()}, {text}"
+    frequency, members = math.nan, tuple[float, ...]()
+    if held.kind is ChatterKind.HOPF and f.chatter is not None:
+        frequency, members = f.chatter.frequency, f.chatter.members
+    elif held.kind in (ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT):
+        frequency, members = f.half.frequency, f.half.members
+    return replace(
+        blank, state=held.kind, reason=reason, reason_text=text, chatter_frequency=frequency, chatter_family=members,
+        tooth_passing_frequency=config.teeth * f.frequency, spindle_speed=2 * math.pi * f.frequency,
+        spindle_speed_source=SpeedSource.REFINED if f.comb >= 2 else blank.spindle_speed_source,
+        asynchronous_ratio=judgement.asynchronous_ratio, half_order_ratio=judgement.half_order_ratio,
+        confidence=judgement.confidence,
+    )
+
+
+def _choose_channel(config: ChatterConfig, s: Stream, start: int, end: int) -> tuple[int, Array, Reason, str]:
+    """Index and samples of the judged channel, and why it cannot be judged (NONE where it can)."""
+    names = [c.name for c in s.channels]
+    if config.channel and config.channel not in names:
+        return 0, np.zeros(0), Reason.BAD_SAMPLES, f"no channel {config.channel!r} among {', '.join(names)}"
+    chosen = names.index(config.channel) if config.channel else 0
+    first: tuple[int, Array, Reason, str] | None = None
+    others = [k for k in range(len(names)) if k != chosen] if config.fallback or not config.channel else []
+    for k in (chosen, *others):
+        x = streams.samples(s, start, end, k)
+        reason, text = _condition(x, streams.status(s, start, end, k), names[k])
+        if reason is Reason.NONE:
+            return k, x.astype(np.float64), reason, text
+        first = first or (k, x.astype(np.float64), reason, text)
+    assert first is not None
+    return first
+
+
+def _condition(x: NDArray[np.float32], status: Status, name: str) -> tuple[Reason, str]:
+    if not np.isfinite(x).all():
+        return Reason.BAD_SAMPLES, f"channel {name} holds values that are no numbers"
+    low, high = float(x.min()), float(x.max())
+    if status & Status.DEAD or low == high:
+        return Reason.BAD_SAMPLES, f"channel {name} is dead"
+    if status & Status.SATURATED or _clipped(x, low, high):
+        return Reason.SATURATED, f"channel {name} is saturated"
+    return Reason.NONE, ""
+
+
+def _clipped(x: NDArray[np.float32], low: float, high: float) -> bool:
+    """True where the extremes are held: at least 0.2 % of the samples equal an extreme, mostly in runs."""
+    for extreme in (low, high):
+        at = np.flatnonzero(x == extreme)
+        held = len(at) >= max(8, 0.002 * len(x)) and np.mean(np.diff(at) == 1) > 0.4
+        if held and abs(extreme) >= 0.99 * max(-low, high):
+            return True
+    return False
