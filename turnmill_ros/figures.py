@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool, Label, LinearColorMapper, Range1d, Span
+from bokeh.models import ColorBar, ColumnDataSource, HoverTool, Label, LinearColorMapper, Range1d, Span
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
@@ -26,12 +26,13 @@ STATE_COLOURS = {
     ChatterKind.FLIP_OR_RUNOUT: "#e69f00",
 }
 LINE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-WIDTH = 980
+FRAME_WIDTH = 780
+RATIO_FLOOR = 1e-4
 
 
 def _figure(title: str, x: str, y: str, height: int = 260, **options: object) -> figure:
-    plot = figure(title=title, x_axis_label=x, y_axis_label=y, width=WIDTH, height=height,
-                  tools="pan,box_zoom,xwheel_zoom,reset,save", **options)
+    plot = figure(title=title, x_axis_label=x, y_axis_label=y, frame_width=FRAME_WIDTH, height=height,
+                  tools="pan,box_zoom,xwheel_zoom,reset,save", toolbar_location="above", **options)
     plot.toolbar.logo = None
     plot.title.text_font_size = "13pt"
     plot.xaxis.axis_label_text_font_size = plot.yaxis.axis_label_text_font_size = "11pt"
@@ -48,7 +49,7 @@ def _legend_right(plot: figure) -> None:
 def verdict_band(segments: Sequence[tuple[float, float, ChatterKind]], x_range: Range1d | None = None) -> figure:
     """Timeline of verdicts: one coloured bar per segment (start [s], end [s], state)."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure("Verdict", "time [s]", "", 150, y_range=(0, 1), **options)
+    plot = _figure("Verdict", "time [s]", "", 190, y_range=(0, 1), **options)
     for kind in ChatterKind:
         bars = [(a, b) for a, b, state in segments if state is kind]
         if bars:
@@ -57,7 +58,8 @@ def verdict_band(segments: Sequence[tuple[float, float, ChatterKind]], x_range: 
     plot.yaxis.visible = False
     plot.ygrid.visible = False
     if segments:
-        _legend_right(plot)
+        plot.legend.orientation = "horizontal"
+        plot.add_layout(plot.legend[0], "above")
     return plot
 
 
@@ -81,10 +83,10 @@ def spectrogram(
         plot.scatter([t for t, _ in chatter], [f for _, f in chatter], color="#d55e00", line_color="#ffffff",
                      line_width=0.5, size=6, legend_label="chatter line")
     if tooth_passing or chatter:
-        plot.legend.background_fill_color = "#999999"
-        _legend_right(plot)
-    from bokeh.models import ColorBar
-
+        plot.legend.background_fill_color = "#666666"
+        plot.legend.label_text_color = "#ffffff"
+        plot.legend.location = "top_right"
+        plot.legend.background_fill_alpha = 0.8
     plot.add_layout(ColorBar(color_mapper=mapper, title=f"dB re 1 {unit}/\u221aHz", width=10), "right")
     return plot
 
@@ -93,18 +95,17 @@ def ratios(verdicts: Sequence[Verdict], start_ns: int, enter: float, leave: floa
            x_range: Range1d | None = None) -> figure:
     """Asynchronous and half-order ratios over time with the decision thresholds `enter` and `leave`."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure("What the verdict stands on", "time [s]", "share of energy [1]", 260, y_range=(-0.02, 1.02), **options)
+    plot = _figure("What the verdict stands on", "time [s]", "share of energy [1]", 280, y_axis_type="log",
+                   y_range=(RATIO_FLOOR, 1.5), **options)
     time = [(v.window_end_ns - start_ns) * 1e-9 for v in verdicts]
     for name, values, colour, dash in (
         ("asynchronous", [v.asynchronous_ratio for v in verdicts], LINE_COLOURS[0], "solid"),
         ("half order", [v.half_order_ratio for v in verdicts], LINE_COLOURS[3], "dashed"),
-        ("confidence", [v.confidence for v in verdicts], "#888888", "dotted"),
     ):
-        plot.line(time, values, legend_label=name, color=colour, line_width=2, line_dash=dash)
-    plot.add_layout(Span(location=enter, dimension="width", line_color="#444444", line_dash="dashed"))
-    plot.add_layout(Label(x=5, y=enter, x_units="screen", text="enter", text_font_size="9pt", y_offset=1))
-    plot.add_layout(Span(location=leave, dimension="width", line_color="#444444", line_dash="dotted"))
-    plot.add_layout(Label(x=45, y=leave, x_units="screen", text="leave", text_font_size="9pt", y_offset=1))
+        plot.line(time, np.maximum(values, RATIO_FLOOR), legend_label=name, color=colour, line_width=2, line_dash=dash)
+    ends = time[:1] + time[-1:]
+    for name, level, dash in (("chatter above", enter, "dashed"), ("ends below", leave, "dotted")):
+        plot.line(ends, [level] * len(ends), color="#444444", line_dash=dash, legend_label=name)
     _legend_right(plot)
     return plot
 

@@ -39,7 +39,7 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
     plots: list[tuple[str, Any]] = []
     band = [(analysis.seconds(s.start_ns), analysis.seconds(s.end_ns), s.state) for s in analysis.segments]
     plots.append(("Over time", figures.verdict_band(band, x_range)))
-    channel = analysis.verdicts[0].channel if analysis.verdicts else ""
+    channel = next((v.channel for v in analysis.verdicts if v.channel), "")
     picture = spectrogram(analysis.path, channel, start) if channel else None
     if picture is not None:
         stamped = [((v.window_end_ns - start) * 1e-9, v) for v in analysis.verdicts]
