@@ -16,7 +16,7 @@ from turnmill_core.machine.controller import schedule_duration
 from turnmill_core.operation import Operation
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.simulation import Chunk, simulate
-from turnmill_core.process.truth import Truth, crossings, join_truth
+from turnmill_core.process.truth import CROSSING, Truth, crossings, join_truth
 from turnmill_ros.bag_write import BagWriter
 from turnmill_ros.conversions import axes_to_message, block_to_message, operation_to_message
 from turnmill_ros.errors import InputError
@@ -126,7 +126,14 @@ class _InOrder:
 
 
 def truth_json(truth: Truth, op: Operation, config: SimulationConfig, seed: int) -> str:
-    """Truth of a simulated cut as JSON: one value per window, amplitudes in m, times in s from the first sample."""
+    """Truth of a simulated cut as JSON: one value per window, amplitudes in m rms, times in s from the first sample.
+
+    frequency_hz: strongest asynchronous line in each window; chatter_frequency_hz: its median over the windows in
+    which the asynchronous amplitude is more than 20 % of the synchronous one, null without such; crossings: when it
+    passes that share.
+    """
+    with np.errstate(invalid="ignore"):
+        chatter = truth.frequency[truth.ratio > CROSSING]
     record = {
         "operation": {"name": op.name, "sha256": op.sha256},
         "seed": seed,
@@ -135,12 +142,15 @@ def truth_json(truth: Truth, op: Operation, config: SimulationConfig, seed: int)
         "synchronous_m": _numbers(truth.synchronous),
         "asynchronous_m": _numbers(truth.asynchronous),
         "half_order_m": _numbers(truth.half_order),
+        "frequency_hz": _numbers(truth.frequency),
         "in_cut": truth.in_cut.tolist(),
         "touched": truth.touched.tolist(),
+        "chatter_frequency_hz": _numbers(np.array([np.median(chatter) if len(chatter) else np.nan]))[0],
         "crossings": [{"t_s": float(f"{c.time:.6g}"), "rising": c.rising} for c in crossings(truth)],
     }
     return json.dumps(record, separators=(",", ":")).replace(',"', ',\n"') + "\n"
 
 
-def _numbers(values: NDArray[np.float64]) -> list[float]:
-    return [float(f"{value:.6g}") for value in values]
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    """Six digits of each value; None (null) where there is none."""
+    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]
