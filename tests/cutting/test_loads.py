@@ -45,8 +45,9 @@ def test_frames_and_peaks() -> None:
     assert loads.force_machine_mean == pytest.approx(rotation @ loads.force_tool_mean)
     assert loads.force_machine_peak == pytest.approx(rotation @ loads.force_tool_peak)
     assert loads.force_machine_peak[1] == pytest.approx(-loads.force_tool_peak[0])  # x_T = -y_M
-    assert loads.force_tool_peak[0] == loads.force_tool[:, 0].min() < 0
-    assert loads.tool_torque_peak == loads.tool_torque.max()
+    assert loads.force_tool_peak[0] == pytest.approx(loads.force_tool[:, 0].min(), rel=0.01)
+    assert loads.force_tool_peak[0] <= loads.force_tool[:, 0].min() < 0
+    assert loads.tool_torque_peak == pytest.approx(loads.tool_torque.max(), rel=0.01)
     assert loads.force_tool_mean == pytest.approx(loads.force_tool.mean(axis=0), abs=0.2)
     assert loads.tool_torque_mean == pytest.approx(loads.tool_torque.mean(), rel=0.01)
     assert loads.in_cut

@@ -17,20 +17,21 @@ Array = NDArray[np.float64]
 
 @njit(cache=True)
 def static_forces(
-    count: int, window: float, offset: Array, radius: Array, lag: Array, start: Array, stop: Array, feed: Array,
-    delay: Array, step: Array, width: Array, length: Array, coefficients: Array, lever: Array, result: Array,
-) -> float:
+    count: int, enter: Array, leave: Array, offset: Array, radius: Array, lag: Array, start: Array, stop: Array,
+    feed: Array, delay: Array, step: Array, width: Array, length: Array, coefficients: Array, lever: Array,
+    result: Array,
+) -> None:
     """Add forces (x, y, z), tool torque and workpiece torque of the static chip to `result` (count, 5).
 
-    An element covers `window` [rad] around its angle; where the cut covers only a share of that
-    window, the element counts with the share, evaluated at its middle. Returns the largest chip [m].
+    Around the start of an arc an element comes into the cut over the window `enter` [rad] (m, 2), around
+    its exit it goes out over `leave`; within a window it counts with the share that is in the cut,
+    evaluated at the middle of that share.
     """
     cell = 2 * math.pi / count
     sine, cosine = np.empty(count), np.empty(count)
     for i in range(count):
         sine[i], cosine[i] = math.sin(i * cell), math.cos(i * cell)
     ktc, krc, kac, kte, kre, kae = coefficients
-    largest = 0.0
     for j in range(offset.size):
         for k in range(lag.size):
             base = offset[j] - lag[k]
@@ -41,16 +42,19 @@ def static_forces(
                 if stop[k, arc] <= start[k, arc]:
                     continue
                 low, high = start[k, arc] - base, stop[k, arc] - base
-                first = math.floor((low - window / 2) / cell)
-                last = math.ceil((high + window / 2) / cell)
+                before, after = enter[k, arc], leave[k, arc]
+                first = math.floor((low - before / 2) / cell)
+                last = math.ceil((high + after / 2) / cell)
                 row = first % count
                 for i in range(first, last + 1):
                     middle = i * cell
-                    left, right = max(middle - window / 2, low), min(middle + window / 2, high)
-                    if right > left:
-                        if left == low or right == high:
-                            share = (right - left) / window
-                            s, c = math.sin((left + right) / 2 + base), math.cos((left + right) / 2 + base)
+                    outside = max(0.0, low - middle + before / 2)
+                    past = max(0.0, middle + after / 2 - high)
+                    if outside < before and past < after:
+                        if outside > 0.0 or past > 0.0:
+                            share = (1.0 - outside / before) * (1.0 - past / after)
+                            angle = middle + base + (outside - past) / 2
+                            s, c = math.sin(angle), math.cos(angle)
                         else:
                             share = 1.0
                             s = sine[row] * cos_base + cosine[row] * sin_base
@@ -60,7 +64,6 @@ def static_forces(
                         for p in range(1, delay.shape[1]):
                             h = min(h, along * delay[j, p] + step[j, p])
                         if h > 0.0:
-                            largest = max(largest, h)
                             area = h * width[k]
                             ft = share * (ktc * area + edge_t)
                             fr = share * (krc * area + edge_r)
@@ -74,7 +77,6 @@ def static_forces(
                     row += 1
                     if row == count:
                         row = 0
-    return largest
 
 
 @njit(cache=True)

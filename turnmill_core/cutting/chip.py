@@ -102,6 +102,15 @@ def static_chip(cut: Cut, phi: Array) -> Array:
     return np.asarray(np.maximum(chip.min(axis=-1), 0.0), dtype=np.float64)
 
 
+def largest_static_chip(cut: Cut) -> float:
+    """Largest `static` chip [m] of all teeth and heights: at the end of an arc or across the feed, whichever is in."""
+    arcs = cut.engagement
+    across = np.clip(np.arctan2(cut.feed[:, 0], cut.feed[:, 1])[:, None], arcs.start, arcs.exit)
+    phi = np.stack([arcs.start, across, arcs.exit]).transpose(0, 2, 1).reshape(-1, 1, len(arcs.start))
+    cuts = np.tile((arcs.exit > arcs.start).T, (3, 1))[:, None, :]
+    return float(np.where(cuts, static_chip(cut, phi), 0.0).max())
+
+
 def exact_chip(cut: Cut, phi: Array) -> Array:
     """Material along the tooth's normal [m] at the tooth angles `phi` [rad] (n, N, m), engagement included.
 

@@ -163,8 +163,10 @@ def _crossing(op: Operation, conditions: Conditions, height: Array, epsilon: Arr
     # the place falls like R cos(phi + epsilon), so step in that cosine
     low, high = -epsilon, math.pi - epsilon
     phi = np.arccos(np.clip(wall / radius * np.ones_like(epsilon), -1.0, 1.0)) - epsilon
-    for _ in range(8):
+    for _ in range(12):  # two or three are enough where the feed per revolution is small beside the bar
         excess = axial_place(lead, radius, radius * np.sin(phi), radius * np.cos(phi), lever) - wall
+        if np.abs(excess).max() < 1e-13 * radius:
+            break
         low, high = np.where(excess > 0, phi, low), np.where(excess > 0, high, phi)
         phi = np.arccos(np.clip(np.cos(phi + epsilon) - excess / radius, -1.0, 1.0)) - epsilon
         phi = np.where((phi < low) | (phi > high), (low + high) / 2, phi)
@@ -196,13 +198,14 @@ def removal(op: Operation, conditions: Conditions) -> Removal:
     """
     if not conditions.in_cut:
         return Removal(0.0, 0.0, 0.0)
-    return Removal(_side(op, conditions), _bottom(op, conditions), _total(op, conditions))
+    height, weight = _heights(op, conditions)
+    side, total = _side(op, conditions, height, weight), _total(op, conditions, height, weight)
+    return Removal(side, _bottom(op, conditions), total)
 
 
-def _total(op: Operation, conditions: Conditions) -> float:
+def _total(op: Operation, conditions: Conditions, height: Array, weight: Array) -> float:
     if op.process == "milling":
         return conditions.feed_speed * conditions.radial_immersion * conditions.depth
-    height, weight = _heights(op, conditions)
     if conditions.workpiece_speed == 0:
         width = 2 * np.minimum(material_half_width(op, conditions, height), op.tool.radius)
         return float(conditions.feed_speed * weight @ width)
@@ -233,8 +236,7 @@ def _heights(op: Operation, conditions: Conditions) -> tuple[Array, Array]:
     return np.concatenate(nodes), np.concatenate(weights)
 
 
-def _side(op: Operation, conditions: Conditions) -> float:
-    height, weight = _heights(op, conditions)
+def _side(op: Operation, conditions: Conditions, height: Array, weight: Array) -> float:
     arcs = engagement(op, conditions, height)
     feed = feed_velocity(op, conditions, height)[:, :, None]
     # integral of f_x sin(phi) + f_y cos(phi) over an arc

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from turnmill_core.cutting import _kernels
-from turnmill_core.cutting.chip import ChipModel, Cut, exact_chip, prepare_cut, static_chip
+from turnmill_core.cutting.chip import ChipModel, Cut, exact_chip, largest_static_chip, prepare_cut, static_chip
 from turnmill_core.cutting.feed import feed_velocity
 from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.operation import Conditions, Material, Operation, require
@@ -28,7 +28,8 @@ class Revolution:
 
     angle [rad] (n,), rotation of the tool, first tooth's tip on +y_T at 0; force_tool [N] (n, 3) on
     the tool, tool frame; tool_torque [N m] (n,), resisting the tool spindle; workpiece_torque [N m]
-    (n,), resisting the workpiece spindle (negative: the cut drives it); chip_thickness_max [m].
+    (n,), resisting the workpiece spindle (negative: the cut drives it); chip_thickness_max [m], the
+    largest chip of the arcs (static) or of the angles (exact).
     """
 
     angle: Array
@@ -64,14 +65,34 @@ def revolution(
     Raises:
         ValueError: not in cut, fewer than 4 angles, no elements, or a depth beyond the flute length.
     """
+    return revolve(op, prepare_cut(op, conditions, elements), angles, chip, engine, average)
+
+
+def revolve(
+    op: Operation, cut: Cut, angles: int = 360, chip: ChipModel = "static",
+    engine: Literal["fast", "plain"] = "fast", average: bool = False,
+) -> Revolution:
+    """As `revolution`, for a cut that has been prepared.
+
+    Args:
+        op: the operation.
+        cut: from `prepare_cut`.
+        angles: number of angles n.
+        chip: `static` or `exact`.
+        engine: `fast` or `plain`.
+        average: see `revolution`.
+
+    Raises:
+        ValueError: fewer than 4 angles, or elements too high for the helix.
+    """
     require(angles >= 4, "angles", angles, "", "an integer >= 4")
-    cut = prepare_cut(op, conditions, elements)
+    elements = cut.elements.height.size
     lag = abs(float(cut.elements.lag[0])) * 2
     require(lag <= math.pi / 2, "elements", elements, "", f"enough for a lag of at most pi/2 in one, not {lag:.3g} rad")
-    window = 2 * math.pi / angles if average else max(lag, _POINT)
+    windows = _windows(cut, 2 * math.pi / angles if average else 0.0)
     result = np.zeros((angles, 5))
     run = _fast if engine == "fast" else _plain
-    largest = run(cut, op.material, chip, window, result)
+    largest = run(cut, op.material, chip, windows, result)
     if op.process == "milling":
         result[:, 4] = 0.0
     angle = np.arange(angles) * (2 * math.pi / angles)
@@ -79,41 +100,64 @@ def revolution(
                       largest)
 
 
+def _windows(cut: Cut, step: float) -> tuple[Array, Array]:
+    """Angles [rad] (m, 2) over which an element comes into and goes out of the cut.
+
+    `step` where it is given: the element stands for that part of the revolution. Otherwise the turn
+    of the tool that carries an arc's end from the top of the element to its bottom, from lag and arc.
+    """
+    arcs = cut.engagement
+    if step:
+        return np.full(arcs.start.shape, step), np.full(arcs.start.shape, step)
+    whole = arcs.exit > arcs.start
+    whole[1:] &= whole[:-1].copy()
+    whole[:-1] &= whole[1:].copy()
+    lag = 2 * cut.elements.lag[0]
+    windows = []
+    for end in (arcs.start, arcs.exit):
+        slope = np.where(whole, np.gradient(end, axis=0), 0.0) if len(end) > 1 else np.zeros(end.shape)
+        windows.append(np.clip(np.abs(slope + lag), _POINT, math.pi / 2))
+    return windows[0], windows[1]
+
+
 def _coefficients(material: Material) -> Array:
     return np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae])
 
 
-def _fast(cut: Cut, material: Material, chip: ChipModel, window: float, result: Array) -> float:
+def _fast(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, Array], result: Array) -> float:
     e, arcs = cut.elements, cut.engagement
     if chip == "static":
-        return float(_kernels.static_forces(
-            len(result), window, e.offset, e.radius, e.lag, arcs.start, arcs.exit, cut.feed, cut.delay, cut.step,
-            e.thickness, e.length, _coefficients(material), cut.lever, result))
+        _kernels.static_forces(
+            len(result), *windows, e.offset, e.radius, e.lag, arcs.start, arcs.exit, cut.feed, cut.delay, cut.step,
+            e.thickness, e.length, _coefficients(material), cut.lever, result)
+        return largest_static_chip(cut)
     return float(_kernels.exact_forces(
         len(result), e.offset, e.radius, cut.tool_radius, e.lag, cut.feed, cut.sense, cut.lead, *cut.walls,
         cut.half_width, cut.lag, cut.step, cut.tool_speed, e.thickness, e.length, _coefficients(material), cut.lever,
         result))
 
 
-def _plain(cut: Cut, material: Material, chip: ChipModel, window: float, result: Array) -> float:
+def _plain(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, Array], result: Array) -> float:
     """The kernels' numpy twin: every angle, tooth, height and arc at once."""
     e = cut.elements
     count = len(result)
     phi = (np.arange(count) * (2 * math.pi / count))[:, None, None] + e.offset[None, :, None] - e.lag[None, None, :]
     if chip == "exact":
-        return _sum_forces(cut, material, exact_chip(cut, phi), phi, np.ones_like(phi), result)
-    largest = 0.0
-    for start, stop in zip(cut.engagement.start.T, cut.engagement.exit.T, strict=True):
-        # the turn in which the window around phi can overlap the arc, and the overlap
-        wrapped = start - window / 2 + (phi - start + window / 2) % (2 * math.pi)
-        left, right = np.maximum(wrapped - window / 2, start), np.minimum(wrapped + window / 2, stop)
-        share = np.where(stop > start, np.maximum(right - left, 0.0) / window, 0.0)
-        middle = (left + right) / 2
-        largest = max(largest, _sum_forces(cut, material, static_chip(cut, middle), middle, share, result))
-    return largest
+        thickness = exact_chip(cut, phi)
+        _sum_forces(cut, material, thickness, phi, np.ones_like(phi), result)
+        return float(thickness.max())
+    arcs = cut.engagement
+    for start, stop, enter, leave in zip(arcs.start.T, arcs.exit.T, windows[0].T, windows[1].T, strict=True):
+        wrapped = start - enter / 2 + (phi - start + enter / 2) % (2 * math.pi)
+        outside = np.maximum(start - wrapped + enter / 2, 0.0)
+        past = np.maximum(wrapped + leave / 2 - stop, 0.0)
+        share = np.maximum(1 - outside / enter, 0.0) * np.maximum(1 - past / leave, 0.0) * (stop > start)
+        middle = wrapped + (outside - past) / 2
+        _sum_forces(cut, material, static_chip(cut, middle), middle, share, result)
+    return largest_static_chip(cut)
 
 
-def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Array, result: Array) -> float:
+def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Array, result: Array) -> None:
     e = cut.elements
     share = np.where(chip > 0, share, 0.0)
     area = chip * e.thickness
@@ -126,7 +170,6 @@ def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Ar
     for column, value in enumerate((x, -radial * cosine + tangential * sine, -axial, radius * tangential,
                                     -cut.lever * x - radius * sine * axial)):
         result[:, column] += value.sum(axis=(1, 2))
-    return float(np.where(share > 0, chip, 0.0).max())
 
 
 def cutting_velocity(op: Operation, conditions: Conditions, angle: Array, height: Array) -> Array:

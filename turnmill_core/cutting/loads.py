@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnmill_core.cutting.chip import ChipModel
+from turnmill_core.cutting.chip import ChipModel, prepare_cut
 from turnmill_core.cutting.engagement import Engagement, engagement, removal
-from turnmill_core.cutting.forces import revolution
-from turnmill_core.cutting.tool import Array, middle_heights, read_only
+from turnmill_core.cutting.forces import revolve
+from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation
 
-_MEAN_ANGLES = 180
+_MEAN_ANGLES = 180  # steps of the mean, second order
+_FINER = 4  # peaks are sought at so many times the angles that are given back
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class CuttingLoads:
 
     Forces [N] (3,) are those that the workpiece exerts on the tool, in the tool frame and in the
     machine frame: mean, integrated over the arcs, and peak, the value of largest magnitude of each
-    component (signed) at the sampled angles.
+    component (signed) at four times the angles given.
     Torques [N m] resist their spindle; powers [W]; chip_thickness_max [m]; cutting_speed [m/s],
     peripheral speed of the tool; tooth_passing_frequency [Hz]; material_removal_rate [m3/s];
     operation_hash, sha256 of the operation's text.
@@ -74,11 +75,12 @@ def cutting_loads(
     Raises:
         ValueError: the depth exceeds the flute length.
     """
-    arcs = _arcs(op, conditions, elements)
+    cut = prepare_cut(op, conditions, elements) if conditions.in_cut else None
+    arcs = cut.engagement if cut else engagement(op, conditions, np.zeros(1))
     in_cut = bool(arcs.angle.any())
-    if in_cut:
-        turn = revolution(op, conditions, angles, elements, chip)
-        mean = revolution(op, conditions, _MEAN_ANGLES, elements, chip, average=True) if chip == "static" else turn
+    if cut and in_cut:
+        turn = revolve(op, cut, angles * _FINER, chip)
+        mean = revolve(op, cut, _MEAN_ANGLES, chip, average=True) if chip == "static" else turn
         angle, force, chip_max = turn.angle, turn.force_tool, turn.chip_thickness_max
         tool_torque, workpiece_torque = turn.tool_torque, turn.workpiece_torque
         force_mean = mean.force_tool.mean(axis=0)
@@ -86,9 +88,9 @@ def cutting_loads(
         volume = removal(op, conditions)
         rate, bottom_share = volume.total, volume.bottom_share
     else:
-        angle = read_only(np.arange(angles) * (2 * math.pi / angles))
-        force, chip_max = read_only(np.zeros((angles, 3))), 0.0
-        tool_torque = workpiece_torque = read_only(np.zeros(angles))
+        angle = np.asarray(np.arange(angles * _FINER) * (2 * math.pi / (angles * _FINER)), dtype=np.float64)
+        force, chip_max = np.zeros((angle.size, 3)), 0.0
+        tool_torque = workpiece_torque = np.zeros(angle.size)
         force_mean, tool_torque_mean, workpiece_torque_mean = np.zeros(3), 0.0, 0.0
         rate, bottom_share = 0.0, 0.0
     rotation = machine_from_tool(op, conditions)
@@ -110,20 +112,13 @@ def cutting_loads(
         material_removal_rate=rate,
         in_cut=in_cut,
         operation_hash=op.sha256,
-        angle=angle,
-        force_tool=force,
-        tool_torque=tool_torque,
-        workpiece_torque=workpiece_torque,
+        angle=read_only(angle[::_FINER]),
+        force_tool=read_only(force[::_FINER]),
+        tool_torque=read_only(tool_torque[::_FINER]),
+        workpiece_torque=read_only(workpiece_torque[::_FINER]),
         engagement=arcs,
         bottom_share=bottom_share,
     )
-
-
-def _arcs(op: Operation, conditions: Conditions, elements: int) -> Engagement:
-    """Arcs at the middle of each element; empty at the tip where there is no contact."""
-    if not conditions.in_cut:
-        return engagement(op, conditions, np.zeros(1))
-    return engagement(op, conditions, middle_heights(conditions.depth, elements))
 
 
 def _peak(values: Array) -> Array:
