@@ -77,14 +77,14 @@ def import_sound(
         writer = _Writer(file, op, output, overwrite, start_ns, axes)
         with writer.bag:
             done = 0
-            for samples in sound.blocks(blocksize=size, dtype="float32", always_2d=True):
+            for samples in _sound_blocks(file, sound, size):
                 writer.block(samples, done, rate, channels, limit)
                 done += len(samples)
                 if progress is not None:
                     progress(done / sound.frames)
             writer.finish()
-        if done < sound.frames:
-            notes.append(f"the file is shorter than its header says: {done} of {sound.frames} samples")
+        if _cut_short(file):
+            notes.append("the file is shorter than its header says: it was cut off, and the rest is missing")
     return Imported(Path(output), names, rate, done, (*filter(None, notes), *writer.notes()))
 
 
@@ -121,6 +121,20 @@ def import_csv(
         writer.finish()
     names = tuple(channel.name for channel in channels)
     return Imported(Path(output), names, rate, len(table.index), (*table.notes, *writer.notes()))
+
+
+def _sound_blocks(file: Path, sound: soundfile.SoundFile, size: int) -> Iterator[Samples]:
+    try:
+        yield from sound.blocks(blocksize=size, dtype="float32", always_2d=True)
+    except soundfile.LibsndfileError as error:
+        raise InputError(f"the sound file is damaged: {str(error).removeprefix('Error : ')}", file=file) from error
+
+
+def _cut_short(file: Path) -> bool:
+    """True for a WAV file with fewer bytes than it should have (libsndfile does not tell)."""
+    with file.open("rb") as stream:
+        head = stream.read(8)
+    return head[:4] == b"RIFF" and int.from_bytes(head[4:8], "little") + 8 > file.stat().st_size
 
 
 def _runs(table: Table, size: int) -> Iterator[tuple[int, Samples]]:
