@@ -27,9 +27,6 @@ _DOMAINS = _domains()
 os.environ["ROS_DOMAIN_ID"] = str(next(_DOMAINS))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ.pop("ROS_STATIC_PEERS", None)
-# Many small matrices: one BLAS thread is up to ten times faster than several on a busy machine.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 
 @pytest.fixture
