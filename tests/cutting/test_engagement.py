@@ -118,6 +118,21 @@ def test_milling_removes_through_the_side_only() -> None:
     assert volume.total == pytest.approx(0.1e-3 * 4 * 50 * 8e-3 * 3e-3)
 
 
+def test_a_span_wider_than_the_tool_removes_a_slot() -> None:
+    wide = milling(TOOL, AL6061, 3 * MM, 0.1 * MM, (-25 * MM, 25 * MM))
+    assert removal(wide, wide.conditions).total == pytest.approx(0.1e-3 * 4 * 50 * 20e-3 * 3e-3)
+    assert removal(wide, wide.conditions).side == pytest.approx(removal(wide, wide.conditions).total, rel=1e-12)
+
+
+def test_workpiece_at_rest_removes_the_segment_of_the_bar() -> None:
+    op = turn_milling(TOOL, AL6061, 60 * MM, 1 * MM, 4 * MM, 3000, 10)
+    c = dataclasses.replace(op.conditions, workpiece_speed=0.0, feed_speed=0.02)
+    angle = 2 * math.acos(29 / 30)
+    segment = (30e-3) ** 2 * (angle - math.sin(angle)) / 2
+    assert removal(op, c).total == pytest.approx(0.02 * segment, rel=1e-6)
+    assert removal(op, c).side == pytest.approx(0.02 * segment, rel=1e-6)
+
+
 def entries(op: Operation, count: int = 150) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where points of the turning bar first meet the tool, by stepping every point along its path.
 

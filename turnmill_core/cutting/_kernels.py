@@ -130,11 +130,21 @@ def exact_forces(
                     if outer <= inner:
                         break
                     r = radius[j] - step[j, p]
-                    tau = tooth_lag[j, p] / tool_speed
-                    for _ in range(4):
-                        delta = tooth_lag[j, p] - tool_speed * tau
-                        tau += (r * math.sin(delta) - tau * across) / (tool_speed * r * math.cos(delta) + across)
-                    inner = max(inner, r * math.cos(tooth_lag[j, p] - tool_speed * tau) - tau * along)
+                    q = across / (tool_speed * r)
+                    delta = q * tooth_lag[j, p] / (1.0 + q)
+                    # behind the feed: no chip even if the path bends twice as much as it does
+                    if step[j, p] + r * delta * delta + along * (tooth_lag[j, p] - delta) / tool_speed < 0.0:
+                        inner = outer
+                        break
+                    for _ in range(3):
+                        sin_delta, cos_delta = math.sin(delta), math.cos(delta)
+                        change = (sin_delta - q * (tooth_lag[j, p] - delta)) / (cos_delta + q)
+                        delta -= change
+                        if abs(change) < 1e-8:  # the next step would be its square
+                            break
+                    # cosine of the last step, expanded
+                    cos_delta += sin_delta * change - cos_delta * change * change / 2
+                    inner = max(inner, r * cos_delta - along * (tooth_lag[j, p] - delta) / tool_speed)
                 h = outer - inner
                 if h > 0.0:
                     largest = max(largest, h)

@@ -118,7 +118,7 @@ def exact_chip(cut: Cut, phi: Array) -> Array:
     predecessor, inside the wall of the previous workpiece revolution and inside the bar. The radius
     at which the predecessor k crossed the ray solves
     r_jk sin(delta) = tau (f . e), delta = lag_jk - Omega_t tau, e the direction of motion of the edge,
-    which Newton's method finds to round-off. The feed is taken as straight over the lag (workpiece
+    which Newton's method solves to round-off. The feed is taken as straight over the lag (workpiece
     rotation of a few mrad) and the wall as smooth.
     """
     sine, cosine = np.sin(phi), np.cos(phi)

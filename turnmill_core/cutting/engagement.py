@@ -191,31 +191,34 @@ def _idle(op: Operation, conditions: Conditions, height: Array) -> np.ndarray[tu
 def removal(op: Operation, conditions: Conditions) -> Removal:
     """Volume removed per time by the side edges, through the bottom, and in total.
 
-    The side integrates the flux (f . n) R dphi dz of material into the engaged tool flank, the
-    bottom the flux Omega_c x_T of material that rises into the end face. The total is independent
-    of both: Omega_c f_a a pi (D_w - a), Omega_c in revolutions (Eq. 5.1 with its lost factor a), or
-    feed speed times area of cut in milling.
+    The side integrates the flux (f . n) R dphi dz of material into the engaged tool flank; see
+    `bottom_rate` and `removal_rate` for the others. The three come from separate integrals.
     """
     if not conditions.in_cut:
         return Removal(0.0, 0.0, 0.0)
-    height, weight = _heights(op, conditions)
-    side, total = _side(op, conditions, height, weight), _total(op, conditions, height, weight)
-    return Removal(side, _bottom(op, conditions), total)
+    return Removal(_side(op, conditions), bottom_rate(op, conditions), removal_rate(op, conditions))
 
 
-def _total(op: Operation, conditions: Conditions, height: Array, weight: Array) -> float:
+def removal_rate(op: Operation, conditions: Conditions) -> float:
+    """Material removal rate [m3/s]: Omega_c f_a a pi (D_w - a), Omega_c in revolutions, or feed speed times section.
+
+    Eq. 5.1 with its lost factor a. A slot in turn-milling is as wide as the helix of the tool sweeps.
+    """
+    if not conditions.in_cut:
+        return 0.0
+    radius, depth = op.tool.radius, conditions.depth
+    width = min(conditions.cross_feed_span[1], radius) - max(conditions.cross_feed_span[0], -radius)
     if op.process == "milling":
-        return conditions.feed_speed * conditions.radial_immersion * conditions.depth
+        return conditions.feed_speed * width * depth
+    if any(map(math.isfinite, walls(op, conditions))):
+        section = (conditions.effective_radius + depth) ** 2 - conditions.effective_radius**2
+        return abs(conditions.workpiece_speed) * width * section / 2
+    height = depth * (1 - ((_NODES + 1) / 2) ** 2)
+    weight = _WEIGHTS * depth * (_NODES + 1) / 2
+    speed = np.hypot(*feed_velocity(op, conditions, height).T)
     if conditions.workpiece_speed == 0:
-        width = 2 * np.minimum(material_half_width(op, conditions, height), op.tool.radius)
-        return float(conditions.feed_speed * weight @ width)
-    lead, lever = helix_lead(op, conditions), lever_arm(op, conditions, height)
-    low, high = conditions.cross_feed_span
-    # a slot is as wide as the helix of the tool sweeps
-    width = (high - low) * np.ones_like(lever)
-    if all(map(math.isinf, walls(op, conditions))):
-        width = 2 * op.tool.radius * np.sqrt(1 + (lead / lever) ** 2)
-    return float(abs(conditions.workpiece_speed) * weight @ (lever * width))
+        return float(weight @ (2 * speed * np.minimum(material_half_width(op, conditions, height), radius)))
+    return float(weight @ (2 * radius * speed))
 
 
 def _heights(op: Operation, conditions: Conditions) -> tuple[Array, Array]:
@@ -236,7 +239,8 @@ def _heights(op: Operation, conditions: Conditions) -> tuple[Array, Array]:
     return np.concatenate(nodes), np.concatenate(weights)
 
 
-def _side(op: Operation, conditions: Conditions, height: Array, weight: Array) -> float:
+def _side(op: Operation, conditions: Conditions) -> float:
+    height, weight = _heights(op, conditions)
     arcs = engagement(op, conditions, height)
     feed = feed_velocity(op, conditions, height)[:, :, None]
     # integral of f_x sin(phi) + f_y cos(phi) over an arc
@@ -244,8 +248,9 @@ def _side(op: Operation, conditions: Conditions, height: Array, weight: Array) -
     return float(op.tool.radius * weight @ flux.sum(axis=1))
 
 
-def _bottom(op: Operation, conditions: Conditions) -> float:
-    if op.process == "milling" or conditions.workpiece_speed == 0:
+def bottom_rate(op: Operation, conditions: Conditions) -> float:
+    """Material [m3/s] that enters through the tool's bottom: the flux Omega_c x_T of what rises into the end face."""
+    if not conditions.in_cut or op.process == "milling" or conditions.workpiece_speed == 0:
         return 0.0
     tip, radius = np.zeros(1), op.tool.radius
     half_width = float(material_half_width(op, conditions, tip)[0])

@@ -43,7 +43,7 @@ def cross_feed_sense(conditions: Conditions) -> float:
 
 
 def feed_angle(op: Operation, conditions: Conditions, height: Array) -> Array:
-    """Angle epsilon [rad] (m,) of the resultant feed from +x_T towards +y_T, in [-pi/2, pi/2].
+    """Angle epsilon [rad] (m,) of the resultant feed at each `height` [m], from +x_T towards +y_T, in [-pi/2, pi/2].
 
     The thesis puts x_T on the resultant feed itself (Eq. 3.32); here x_T stays on the machine's
     axis and the resultant is turned by epsilon = atan2(f_y, f_x(z)), about 0.3 degrees in ordinary

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnmill_core.cutting.chip import ChipModel, prepare_cut
-from turnmill_core.cutting.engagement import Engagement, engagement, removal
+from turnmill_core.cutting.engagement import Engagement, bottom_rate, engagement, removal_rate
 from turnmill_core.cutting.forces import revolve
 from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.machine.conditions import machine_from_tool
@@ -85,8 +85,8 @@ def cutting_loads(
         tool_torque, workpiece_torque = turn.tool_torque, turn.workpiece_torque
         force_mean = mean.force_tool.mean(axis=0)
         tool_torque_mean, workpiece_torque_mean = float(mean.tool_torque.mean()), float(mean.workpiece_torque.mean())
-        volume = removal(op, conditions)
-        rate, bottom_share = volume.total, volume.bottom_share
+        rate = removal_rate(op, conditions)
+        bottom_share = bottom_rate(op, conditions) / rate
     else:
         angle = np.asarray(np.arange(angles * _FINER) * (2 * math.pi / (angles * _FINER)), dtype=np.float64)
         force, chip_max = np.zeros((angle.size, 3)), 0.0

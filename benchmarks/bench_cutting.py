@@ -1,0 +1,83 @@
+"""Speed of the cutting model: one revolution, compiled beside numpy, and the loads of a node.
+
+    python benchmarks/bench_cutting.py [--json]
+
+Best of several runs. The calibration loop (a fixed numpy job) tells how fast the machine is at the moment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from turnmill_core.cutting.chip import prepare_cut
+from turnmill_core.cutting.forces import revolve
+from turnmill_core.cutting.loads import cutting_loads
+from turnmill_core.operation import Conditions, Material, Operation, Tool, Workpiece
+from turnmill_core.operation_file import read_operation, shipped_operations
+
+
+def best_of(job: Callable[[], object], runs: int) -> float:
+    """Shortest time of `runs` runs [s], after one to warm up."""
+    job()
+    times = []
+    for _ in range(runs):
+        begin = time.perf_counter()
+        job()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def calibration() -> float:
+    """Time of sorting 200 000 fixed numbers [s]."""
+    values = np.random.default_rng(1).random(200_000)
+    return best_of(lambda: np.sort(values), 10)
+
+
+def slot() -> Operation:
+    """Full slot with 4 teeth and 30 degrees of helix: every second element is in the cut, the worst case."""
+    tool = Tool("end mill", 0.02, 4, math.radians(30))
+    conditions = Conditions(3000 * 2 * math.pi / 60, 0.0, 0.005, 0.02, (-0.01, 0.01))
+    material = Material("aluminium", 930e6, 290e6, 242e6, 21e3, 25e3, 8e3)
+    block = Workpiece("block", length=0.2, width=0.1, height=0.05)
+    return Operation("slot", "milling", "none", tool, block, material, conditions, "slot", feed_per_tooth=1e-4)
+
+
+def measure() -> dict[str, float]:
+    """All figures: name with unit -> value."""
+    result = {"calibration_s": calibration()}
+    cases = {"slot": slot(), "turn_milling": read_operation(shipped_operations()["thesis_table_3_2"])}
+    for name, op in cases.items():
+        cut = prepare_cut(op, op.conditions, 100)
+        for chip in ("static", "exact"):
+            fast = best_of(lambda: revolve(op, cut, 360, chip, "fast"), 30)  # noqa: B023
+            plain = best_of(lambda: revolve(op, cut, 360, chip, "plain"), 3)  # noqa: B023
+            result[f"{name}_{chip}_360x100_s"] = fast
+            result[f"{name}_{chip}_plain_over_fast"] = plain / fast
+        begin, count = time.process_time(), 100
+        for _ in range(count):
+            cutting_loads(op, op.conditions)
+        result[f"{name}_loads_cpu_s"] = (time.process_time() - begin) / count
+        result[f"{name}_loads_cpu_share_at_50_hz"] = 50 * result[f"{name}_loads_cpu_s"]
+    return result
+
+
+def main() -> None:
+    """Print the figures as a table or as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    figures = measure()
+    if parser.parse_args().json:
+        print(json.dumps(figures))
+        return
+    for name, value in figures.items():
+        print(f"{name:45s} {value:.6g}")
+
+
+if __name__ == "__main__":
+    main()
