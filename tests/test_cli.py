@@ -79,7 +79,7 @@ def test_set_changes_the_operation_and_its_hash(capsys: pytest.CaptureFixture[st
     (("replay", "nowhere.mcap", "--rate", "0"), ("--rate", "0", "max")),
     (("import", "nowhere.wav", "--operation", "face_mill_6_teeth", "-o", "new.mcap"), ("nowhere.wav",)),
     (("simulate", "demo_turn_milling", "-o", "no_folder/new.mcap"), ("no_folder",)),
-    (("simulate", "demo_turn_milling", "-o", "new.mcap", "--channels", "9"), ("9",)),
+    (("simulate", "demo_turn_milling", "-o", "new.mcap", "--channels", "9"), ("channels", "9")),
     (("stability",), ("OP",)),
 ])
 def test_bad_input_is_one_clear_line(arguments: tuple[str, ...], words: tuple[str, ...], tmp_path: Path,

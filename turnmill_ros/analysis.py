@@ -53,7 +53,9 @@ class Analysis:
         return (stamp_ns - self.start_ns) * 1e-9
 
 
-def analyze(path: Path, operation: Operation | None = None, progress: Callable[[float], None] | None = None) -> Analysis:
+def analyze(
+    path: Path, operation: Operation | None = None, progress: Callable[[float], None] | None = None
+) -> Analysis:
     """Run the monitor over a bag; `operation` replaces the one in the bag.
 
     Raises InputError for a bag that cannot be trusted, naming file and reason.
@@ -65,13 +67,14 @@ def analyze(path: Path, operation: Operation | None = None, progress: Callable[[
         if progress is not None:
             progress(share)
     return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts),
-                    dict(feed.counts))
+                    feed.counts)
 
 
-def analysis_of(path: Path, verdicts: Sequence[Verdict], counts: dict[str, int]) -> Analysis:
-    """The analysis that holds given verdicts, as a run of the nodes gave them, on the bag that was recorded with them."""
+def analysis_of(path: Path, verdicts: Sequence[Verdict]) -> Analysis:
+    """The analysis that holds the verdicts of a run of the nodes, on the bag that was recorded with them."""
     feed = open_feed(path)
-    return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts), counts)
+    return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts),
+                    feed.counts)
 
 
 def merge(verdicts: Iterable[Verdict]) -> tuple[Segment, ...]:
@@ -97,10 +100,14 @@ def merge(verdicts: Iterable[Verdict]) -> tuple[Segment, ...]:
 
 def summary(analysis: Analysis) -> dict[str, Any]:
     """Durations per state, share of the cut in chatter, and median chatter frequency."""
-    length = {kind: sum((s.end_ns - s.start_ns) * 1e-9 for s in analysis.segments if s.state is kind) for kind in ChatterKind}
+    length = {
+        kind: sum((s.end_ns - s.start_ns) * 1e-9 for s in analysis.segments if s.state is kind) for kind in ChatterKind
+    }
     in_cut = sum(v for k, v in length.items() if k not in (ChatterKind.UNKNOWN, ChatterKind.AIR))
     chatter = sum(length[k] for k in CHATTER)
-    heard = [v.chatter_frequency for v in analysis.verdicts if v.state in CHATTER and math.isfinite(v.chatter_frequency)]
+    heard = [
+        v.chatter_frequency for v in analysis.verdicts if v.state in CHATTER and math.isfinite(v.chatter_frequency)
+    ]
     return {
         "duration_s": analysis.seconds(analysis.end_ns),
         "in_cut_s": in_cut,
@@ -174,7 +181,9 @@ def timeline(segments: Sequence[Segment], shortest_s: float = 0.3) -> tuple[Segm
             continue
         if kept and kept[-1].state is s.state:
             a = kept[-1]
-            kept[-1] = Segment(a.start_ns, s.end_ns, s.state, a.chatter_frequency, a.confidence, a.verdicts + s.verdicts)
+            kept[-1] = Segment(
+                a.start_ns, s.end_ns, s.state, a.chatter_frequency, a.confidence, a.verdicts + s.verdicts
+            )
         else:
             kept.append(s)
     return tuple(kept)

@@ -6,6 +6,7 @@ Writes the recorded MCAP, the verdict table and the report to a folder, by defau
 from __future__ import annotations
 
 import json
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +46,7 @@ def changes(analysis: Analysis, truth: dict[str, Any]) -> list[Change]:
 
     Raises InputError where the timeline is not air, stable, Hopf, stable.
     """
-    seen = [s for s in timeline(analysis.segments)]
+    seen = timeline(analysis.segments)
     states = tuple(s.state for s in seen[: len(EXPECTED)])
     if states != EXPECTED:
         raise InputError("the timeline is " + ", ".join(s.state.name for s in seen),
@@ -67,8 +68,8 @@ def run(bag: Path, folder: Path) -> None:
         path.unlink(missing_ok=True)
     began = time.monotonic()
     console.print(f"replaying {bag} through ROS 2 nodes ...", soft_wrap=True)
-    result = replay(bag, rate=0.0, out=recorded)
-    analysis = analysis_of(recorded, result.verdicts, result.counts)
+    result = replay(bag, rate=math.inf, output=recorded)
+    analysis = analysis_of(recorded, result.verdicts)
     show_analysis(analysis)
     truth_path = bag.with_name(bag.name.removesuffix(".mcap") + ".truth.json")
     truth = json.loads(truth_path.read_text(encoding="utf-8"))
@@ -94,7 +95,9 @@ def run(bag: Path, folder: Path) -> None:
 
 def main(
     bag: Annotated[Path, typer.Option(help="Recording to replay.")] = Path("bags/demo_turn_milling.mcap"),
-    folder: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; old ones are replaced.")] = Path("out"),
+    folder: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the results; old ones are replaced.")
+    ] = Path("out"),
 ) -> None:
     """Replay the demo recording through ROS 2 nodes.
 

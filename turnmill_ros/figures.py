@@ -139,10 +139,14 @@ def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], t
     return plot
 
 
-def forces(angle: NDArray[np.float64], force: NDArray[np.float64], torque: NDArray[np.float64]) -> tuple[figure, figure]:
+def forces(
+    angle: NDArray[np.float64], force: NDArray[np.float64], torque: NDArray[np.float64]
+) -> tuple[figure, figure]:
     """Forces on the tool (n, 3) [N], tool frame, and tool torque (n,) [N m] over one revolution (angle [rad])."""
     degrees = np.degrees(angle)
-    plot = _figure("Predicted forces on the tool over one revolution (tool frame)", "tool rotation [deg]", "force [N]", 300)
+    plot = _figure(
+        "Predicted forces on the tool over one revolution (tool frame)", "tool rotation [deg]", "force [N]", 300
+    )
     for k, name in enumerate(("x feed", "y cross feed", "z tool axis")):
         plot.line(degrees, force[:, k], color=LINE_COLOURS[k], line_width=2, legend_label=name,
                   line_dash=("solid", "dashed", "dotdash")[k])

@@ -27,8 +27,18 @@ class Predictions:
         made = []
         if self.loads:
             time = [(s - start_ns) * 1e-9 for s, _, _ in self.loads]
-            made.append(figures.lines_over_time("Predicted load on the tool", "N, N m", time, {
-                "mean force [N]": [f for _, f, _ in self.loads], "mean torque [N m]": [t for _, _, t in self.loads]}, x_range))
+            made.append(
+                figures.lines_over_time(
+                    "Predicted load on the tool",
+                    "N, N m",
+                    time,
+                    {
+                        "mean force [N]": [f for _, f, _ in self.loads],
+                        "mean torque [N m]": [t for _, _, t in self.loads],
+                    },
+                    x_range,
+                )
+            )
         if self.margins:
             time = [(s - start_ns) * 1e-9 for s, _, _ in self.margins]
             made.append(figures.lines_over_time("Depth of cut and its predicted limit", "depth [mm]", time, {

@@ -14,7 +14,7 @@ from bokeh.models import Range1d
 from bokeh.resources import INLINE
 
 from turnmill_core.cutting.loads import CuttingLoads
-from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+from turnmill_core.monitoring.verdict import ChatterKind
 from turnmill_core.operation import Conditions, Operation
 from turnmill_core.operation_file import describe
 from turnmill_ros import figures
@@ -43,7 +43,9 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
     picture = spectrogram(analysis.path, channel, start) if channel else None
     if picture is not None:
         stamped = [((v.window_end_ns - start) * 1e-9, v) for v in analysis.verdicts]
-        chatter = [(t, v.chatter_frequency) for t, v in stamped if v.state in CHATTER and math.isfinite(v.chatter_frequency)]
+        chatter = [
+            (t, v.chatter_frequency) for t, v in stamped if v.state in CHATTER and math.isfinite(v.chatter_frequency)
+        ]
         passing = [(t, v.tooth_passing_frequency) for t, v in stamped]
         plots.append(("", figures.spectrogram(
             picture.times, picture.frequencies, picture.level_db, f"Spectrogram of {_named(picture.channel)}",
@@ -51,7 +53,9 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
     config = analysis.config
     plots.append(("", figures.ratios(analysis.verdicts, start, config.enter_ratio, config.leave_ratio, x_range)))
     if predictions is not None:
-        plots += [("Predicted along the way" if k == 0 else "", p) for k, p in enumerate(predictions.plots(start, x_range))]
+        plots += [
+            ("Predicted along the way" if k == 0 else "", p) for k, p in enumerate(predictions.plots(start, x_range))
+        ]
     plots += _spectra(analysis, channel)
     text = _headline(analysis)
     _write(output, f"turnmill: {analysis.path.name}", [
@@ -109,7 +113,9 @@ def _timeline_table(analysis: Analysis) -> str:
 
 def _summary_table(analysis: Analysis) -> str:
     values = summary(analysis)
-    rows = [(_state(ChatterKind[name]), f"{length:.2f}") for name, length in values["durations_s"].items() if length > 0]
+    rows = [
+        (_state(ChatterKind[name]), f"{length:.2f}") for name, length in values["durations_s"].items() if length > 0
+    ]
     counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in analysis.counts.items())
     return "<h2>Time in each state</h2>" + _rows(rows, ("state", "time [s]")) + f"<p class=note>{escape(counts)}</p>"
 
@@ -122,9 +128,13 @@ def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
         if not segments:
             continue
         longest = max(segments, key=lambda s: s.end_ns - s.start_ns)
-        verdicts = [v for v in analysis.verdicts if v.state is kind and longest.start_ns <= v.window_end_ns <= longest.end_ns]
+        verdicts = [
+            v for v in analysis.verdicts if v.state is kind and longest.start_ns <= v.window_end_ns <= longest.end_ns
+        ]
         middle = verdicts[len(verdicts) // 2]
-        length = min(1_000_000_000, max(longest.end_ns - longest.start_ns, middle.window_end_ns - middle.window_start_ns))
+        length = min(
+            1_000_000_000, max(longest.end_ns - longest.start_ns, middle.window_end_ns - middle.window_start_ns)
+        )
         part = stretch(analysis.path, channel, middle.window_end_ns - length, middle.window_end_ns)
         if part is None:
             continue
@@ -144,7 +154,9 @@ def _operation_tables(op: Operation) -> str:
     return "".join(parts)
 
 
-def _write(output: Path, title: str, head: Sequence[str], plots: Sequence[tuple[str, Any]], tail: Sequence[str]) -> None:
+def _write(
+    output: Path, title: str, head: Sequence[str], plots: Sequence[tuple[str, Any]], tail: Sequence[str]
+) -> None:
     script, divs = components([p for _, p in plots]) if plots else ("", ())
     body = [*head]
     for (heading, _), div in zip(plots, divs, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
-from turnmill_ros.monitor_feed import sensor_blocks
+from turnmill_ros import topics
+from turnmill_ros.bag import read_bag
+from turnmill_ros.conversions import block_from_message
 
 MAX_COLUMNS = 600
 
 
 @dataclass(frozen=True)
 class Spectrogram:
-    """Power spectral density: times [s] since start_ns, frequencies [Hz], level [dB re 1 unit^2/Hz] (frequencies, times)."""
+    """Power spectral density: times [s], frequencies [Hz], level_db (frequencies, times) [dB re 1 unit^2/Hz]."""
 
     channel: Channel
     times: NDArray[np.float64]
@@ -38,6 +41,12 @@ class Stretch:
         window = np.hanning(len(self.samples))
         spectrum = np.fft.rfft((self.samples - self.samples.mean()) * window)
         return np.fft.rfftfreq(len(self.samples), 1 / self.sample_rate), np.abs(spectrum) * 2 / window.sum()
+
+
+def sensor_blocks(path: Path) -> Iterator[SensorBlock]:
+    """The sensor blocks of a recording in the order in which they were recorded."""
+    for _, _, message in read_bag(path, (topics.SENSOR_BLOCKS.name,)):
+        yield block_from_message(message)
 
 
 def _index(block: SensorBlock, channel: str) -> int | None:

@@ -44,8 +44,9 @@ def guarded(command: Callable[[], object]) -> int:
         result = command()
         return result if isinstance(result, int) else 0
     except ClickException as error:
-        error.show()
-        return 2
+        context = getattr(error, "ctx", None)
+        where = f"{context.command_path.removeprefix('turnmill ')}: " if context is not None else ""
+        return _fail(f"{where}{error.format_message()} (--help tells more)", 2)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", 130)
     except (InputError, ValueError) as error:

@@ -10,14 +10,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from turnmill_core.cutting.loads import cutting_loads
-from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Conditions, Operation
-from turnmill_core.operation_file import describe, operation_schema, shipped_operations
-from turnmill_core.stability.margin import stability_margin
-from turnmill_ros.cli.output import JsonFlag, OperationArgument, SetOption, console, new_file, print_json, quantity, table
+from turnmill_ros.cli.output import (
+    JsonFlag,
+    OperationArgument,
+    SetOption,
+    console,
+    new_file,
+    print_json,
+    quantity,
+    table,
+)
 from turnmill_ros.errors import InputError
-from turnmill_ros.operations import find_operation
 
 RPM = 60 / (2 * math.pi)
 ToolSpeed = Annotated[str | None, typer.Option("--tool-speed", metavar="QUANTITY", help="Tool speed, e.g. 3350rpm.")]
@@ -45,6 +49,9 @@ def operation(
 
     Example: turnmill operation thesis_table_4_9
     """
+    from turnmill_core.operation_file import describe, operation_schema, shipped_operations
+    from turnmill_ros.operations import find_operation
+
     if schema:
         typer.echo(json.dumps(operation_schema(), indent=2))
         return
@@ -66,8 +73,14 @@ def operation(
     console.print(f"sha256 {op.sha256}", soft_wrap=True)
 
 
-def _cut(op: Operation, tool_speed: str | None, workpiece_speed: str | None, depth: str | None) -> Conditions:
-    return with_cut(
+def _asked(
+    name: str, changes: list[str] | None, tool_speed: str | None, workpiece_speed: str | None, depth: str | None,
+) -> tuple[Operation, Conditions]:
+    from turnmill_core.machine.conditions import with_cut
+    from turnmill_ros.operations import find_operation
+
+    op = find_operation(name, changes or ())
+    return op, with_cut(
         op, quantity(tool_speed, "rad/s", "--tool-speed"), quantity(workpiece_speed, "rad/s", "--workpiece-speed"),
         quantity(depth, "m", "--depth"),
     )
@@ -87,8 +100,9 @@ def forces(
 
     Example: turnmill forces thesis_table_3_1 --report forces.html
     """
-    op = find_operation(op_name, changes or ())
-    cut = _cut(op, tool_speed, workpiece_speed, depth)
+    from turnmill_core.cutting.loads import cutting_loads
+
+    op, cut = _asked(op_name, changes, tool_speed, workpiece_speed, depth)
     loads = cutting_loads(op, cut)
     if report is not None:
         from turnmill_ros.report import forces_report
@@ -138,8 +152,9 @@ def stability(
 
     Example: turnmill stability thesis_table_4_9 --tool-speed 3350rpm --workpiece-speed 6rpm --depth 1.2mm
     """
-    op = find_operation(op_name, changes or ())
-    cut = _cut(op, tool_speed, workpiece_speed, depth)
+    from turnmill_core.stability.margin import stability_margin
+
+    op, cut = _asked(op_name, changes, tool_speed, workpiece_speed, depth)
     margin = stability_margin(op, cut)
     kind = margin.predicted_type.name
     if as_json:

@@ -15,23 +15,38 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from turnmill_core.operation_file import parse_quantity
 from turnmill_ros.errors import InputError
 
 console = Console(highlight=False)
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print JSON for machines (SI units, null where there is none).")]
 OperationArgument = Annotated[
-    str, typer.Argument(metavar="OP", help="Operation file (YAML), or the name of a shipped one: turnmill operation --list.")
+    str,
+    typer.Argument(
+        metavar="OP", help="Operation file (YAML), or the name of a shipped one: turnmill operation --list."
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the operation, e.g. tool.teeth=4. Repeatable."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change one value of the operation, e.g. tool.teeth=4. Repeatable."
+    ),
 ]
 
 
 def quantity(text: str | None, unit: str, option: str) -> float | None:
     """SI value of a command line quantity such as ``3350rpm``; None stays None."""
-    return None if text is None else parse_quantity(text, unit, option)
+    if text is None:
+        return None
+    from turnmill_core.operation_file import parse_quantity
+
+    return parse_quantity(text, unit, option)
+
+
+def whole(value: int, option: str, low: int, high: int | None = None) -> int:
+    """Check that a whole number of the command line lies within its bounds; return it."""
+    if value < low or (high is not None and value > high):
+        raise InputError(option, value=value, expected=f"a whole number >= {low}" + (f" and <= {high}" if high else ""))
+    return value
 
 
 def plain(value: Any) -> Any:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from turnmill_ros.analysis import Analysis, analysis_json, analyze, summary, timeline
-from turnmill_ros.bag import recover as recover_bag
 from turnmill_ros.cli.output import (
     JsonFlag,
     OperationArgument,
@@ -20,11 +18,16 @@ from turnmill_ros.cli.output import (
     progress,
     quantity,
     table,
+    whole,
 )
 from turnmill_ros.errors import InputError
-from turnmill_ros.operations import find_operation
 
-OutputOption = Annotated[Path, typer.Option("--output", "-o", metavar="BAG", help="MCAP file to write; must not exist.")]
+if TYPE_CHECKING:
+    from turnmill_ros.analysis import Analysis
+
+OutputOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="BAG", help="MCAP file to write; must not exist.")
+]
 BagArgument = Annotated[Path, typer.Argument(metavar="BAG", help="Recording (MCAP).")]
 
 
@@ -40,24 +43,37 @@ def simulate(
     op_name: OperationArgument, output: OutputOption,
     duration: Annotated[str | None, typer.Option(help="How long, e.g. 10s; default: the operation's schedule.")] = None,
     sample_rate: Annotated[str, typer.Option(help="Sample rate of the sensors, e.g. 12.8kHz.")] = "12.8 kHz",
-    channels: Annotated[int, typer.Option(min=1, max=5, help="Sound; then displacement of tool x, y, workpiece x, y.")] = 2,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    channels: Annotated[int, typer.Option(help="Sound; then displacement of tool x, y, workpiece x, y.")] = 2,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     changes: SetOption = None, as_json: JsonFlag = False,
 ) -> None:
     """Simulate the operation's schedule in time and write a recording with its truth beside it.
 
     Example: turnmill simulate demo_turn_milling -o cut.mcap
     """
+    from turnmill_ros.operations import find_operation
     from turnmill_ros.simulate import simulate_to_bag
 
     op = find_operation(op_name, changes or ())
     new_file(output)
     with progress(f"simulating {op.name}", quiet=as_json) as advance:
         done = simulate_to_bag(
-            op, output, duration=quantity(duration, "s", "--duration"),
-            sample_rate=quantity(sample_rate, "Hz", "--sample-rate"), channels=channels, seed=seed, progress=advance)
-    report = {"bag": str(done.path), "truth": str(done.truth_path), "blocks": done.blocks, "axis_states": done.axis_states,
-              "duration_s": done.duration, "size_bytes": done.path.stat().st_size}
+            op,
+            output,
+            duration=quantity(duration, "s", "--duration"),
+            sample_rate=quantity(sample_rate, "Hz", "--sample-rate"),
+            channels=whole(channels, "--channels", 1, 5),
+            seed=whole(seed, "--seed", 0),
+            progress=advance,
+        )
+    report = {
+        "bag": str(done.path),
+        "truth": str(done.truth_path),
+        "blocks": done.blocks,
+        "axis_states": done.axis_states,
+        "duration_s": done.duration,
+        "size_bytes": done.path.stat().st_size,
+    }
     if as_json:
         print_json(report)
     else:
@@ -73,14 +89,18 @@ def import_recording(
     measured: Annotated[str | None, typer.Option("--quantity", help="What was measured, e.g. sound_pressure.")] = None,
     unit: Annotated[str | None, typer.Option(help="SI unit of the samples, '1' where the scale is unknown.")] = None,
     time_column: Annotated[str | None, typer.Option(help="CSV: name of the time column (seconds).")] = None,
-    columns: Annotated[str | None, typer.Option(help="CSV: columns to import, comma separated; default: all others.")] = None,
-    changes: SetOption = None, as_json: JsonFlag = False,
+    columns: Annotated[
+        str | None, typer.Option(help="CSV: columns to import, comma separated; default: all others.")
+    ] = None,
+    changes: SetOption = None,
+    as_json: JsonFlag = False,
 ) -> None:
     """Make a recording (MCAP) from a sound or table file and an operation.
 
     Example: turnmill import cut.wav --operation face_mill_6_teeth --set cut.tool_speed='1656 rpm' -o cut.mcap
     """
     from turnmill_ros.importers import import_csv, import_sound
+    from turnmill_ros.operations import find_operation
 
     op = find_operation(op_name, changes or ())
     new_file(output)
@@ -103,14 +123,20 @@ def import_recording(
 
 def analyze_bags(
     bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Recordings (MCAP).")],
-    op_name: Annotated[str | None, typer.Option("--operation", metavar="OP", help="Instead of the one recorded.")] = None,
+    op_name: Annotated[
+        str | None, typer.Option("--operation", metavar="OP", help="Instead of the one recorded.")
+    ] = None,
     report: Annotated[Path | None, typer.Option("--report", metavar="HTML", help="Write a report (one bag).")] = None,
-    changes: SetOption = None, as_json: JsonFlag = False,
+    changes: SetOption = None,
+    as_json: JsonFlag = False,
 ) -> None:
     """Verdicts on recordings, without ROS. With --json one object per bag, each on one line.
 
     Example: turnmill analyze cut.mcap --report cut.html
     """
+    from turnmill_ros.analysis import analysis_json, analyze
+    from turnmill_ros.operations import find_operation
+
     if report is not None and len(bags) != 1:
         raise InputError("--report takes one BAG", value=len(bags), expected="1")
     if report is not None:
@@ -136,12 +162,25 @@ def analyze_bags(
 
 def show_analysis(analysis: Analysis) -> None:
     """Print timeline and summary of one analysed recording."""
+    from turnmill_ros.analysis import summary, timeline
+
     rows = []
     for s in timeline(analysis.segments):
         frequency = f"{s.chatter_frequency:.1f}" if math.isfinite(s.chatter_frequency) else ""
-        rows.append((s.state.name, f"{analysis.seconds(s.start_ns):.2f}", f"{analysis.seconds(s.end_ns):.2f}", frequency,
-                     f"{s.confidence:.2f}"))
-    table(f"{analysis.path}: {analysis.operation.name}", ("state", "from [s]", "to [s]", "chatter [Hz]", "confidence"), rows)
+        rows.append(
+            (
+                s.state.name,
+                f"{analysis.seconds(s.start_ns):.2f}",
+                f"{analysis.seconds(s.end_ns):.2f}",
+                frequency,
+                f"{s.confidence:.2f}",
+            )
+        )
+    table(
+        f"{analysis.path}: {analysis.operation.name}",
+        ("state", "from [s]", "to [s]", "chatter [Hz]", "confidence"),
+        rows,
+    )
     values = summary(analysis)
     shares = ", ".join(f"{name} {length:.1f} s" for name, length in values["durations_s"].items() if length > 0)
     console.print(f"{values['verdict_count']} verdicts over {values['duration_s']:.1f} s: {shares}", soft_wrap=True)
@@ -149,13 +188,17 @@ def show_analysis(analysis: Analysis) -> None:
 
 def recover(
     bag: BagArgument,
-    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="BAG", help="Default: NAME.recovered.mcap.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="BAG", help="Default: NAME.recovered.mcap.")
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Save all that can be read from a truncated recording into a new file; the old one is kept.
 
     Example: turnmill recover cut.mcap.part -o cut.mcap
     """
+    from turnmill_ros.bag import recover as recover_bag
+
     if output is None:
         output = bag.with_name(bag.name.removesuffix(".part").removesuffix(".mcap") + ".recovered.mcap")
     new_file(output)
