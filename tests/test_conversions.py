@@ -12,11 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from turnmill_core.cutting.loads import cutting_loads
 from turnmill_core.machine.axes import AXES, AxisState
 from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.prediction import PredictedType, Prior
+from turnmill_core.stability.margin import stability_lobes, stability_margin
 from turnmill_ros import conversions
 from turnmill_ros.decoding import decoder
 from turnmill_ros.interfaces import own_texts, ros_types, rosbags_types, schema_text, typestore
@@ -184,6 +186,24 @@ def test_margin_keeps_every_field():
     assert all(np.array_equal(back[name], value) for name, value in vars(margin).items())
     prior = conversions.prior_from_margin(message)
     assert prior == Prior(9, PredictedType.FLIP, margin.spectral_radius, margin.chatter_frequency)
+
+
+def test_values_of_the_core_have_the_fields_of_their_messages():
+    operation = read_operation(shipped_operations()["milling_benchmark_1dof"])
+    cut = operation.conditions
+    loads = cutting_loads(operation, cut, angles=36)
+    margin = stability_margin(operation, cut, depth_search=2e-3, speed_search=False)
+    lobes = stability_lobes(operation, [cut.tool_speed, 1.1 * cut.tool_speed], [1e-4, 1e-3])
+    for value, make, back in (
+        (loads, conversions.loads_to_message, conversions.loads_from_message),
+        (margin, conversions.margin_to_message, conversions.margin_from_message),
+        (lobes, conversions.lobes_to_message, conversions.lobes_from_message),
+    ):
+        read = back(_through_bytes(make(value, 11, operation.sha256, TYPES)))
+        assert read.pop("stamp_ns") == 11
+        for name, found in read.items():
+            expected = np.asarray(getattr(value, name), dtype=np.asarray(found).dtype)
+            assert np.array_equal(np.reshape(expected, np.shape(found)), found, equal_nan=True), name
 
 
 def _lobes():
