@@ -30,31 +30,35 @@ CONSTRAINTS = ROOT / "constraints.txt"
 PIP = [str(VENV / "bin" / "python"), "-m", "pip", "--disable-pip-version-check", "--quiet"]
 
 
-def digest(*paths: Path) -> str:
-    """One hash over the contents of files and folders."""
-    total = hashlib.sha256(sys.version.encode())
-    for path in paths:
-        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
-        for file in files:
-            if "__pycache__" not in file.parts:
-                total.update(str(file.relative_to(ROOT)).encode() + file.read_bytes())
+def digest(*parts: object) -> str:
+    """One hash over values and over the contents of folders."""
+    total = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, Path):
+            for file in sorted(p for p in part.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+                total.update(str(file.relative_to(part)).encode() + file.read_bytes())
+        else:
+            total.update(json.dumps(part, sort_keys=True).encode())
     return total.hexdigest()
 
 
-def toml(path: Path) -> dict:
-    """A parsed TOML file."""
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+def toml(folder: Path) -> dict:
+    """The parsed pyproject.toml of a folder."""
+    return tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def requirements(extras: list[str]) -> tuple[list[str], list[str]]:
-    """What is to be installed, and what the two builds need besides."""
-    project, messages = toml(ROOT / "pyproject.toml"), toml(MESSAGES / "pyproject.toml")
-    install = [*project["project"]["dependencies"], *messages["project"]["dependencies"]]
+def requirements(extras: list[str], base: bool = True, messages: bool = True) -> list[str]:
+    """What to download: for the extras, for the base, for the messages, and what the builds need besides."""
+    project, interface = toml(ROOT), toml(MESSAGES)
+    wanted = [*project["build-system"]["requires"], "editables"]
     for extra in extras:
-        install += project["project"]["optional-dependencies"][extra]
-    build = [*project["build-system"]["requires"], "editables", *messages["build-system"]["requires"], "ninja"]
-    build.append("cmake" + messages["tool"]["scikit-build"]["cmake"]["version"])
-    return install, build
+        wanted += project["project"]["optional-dependencies"][extra]
+    if base:
+        wanted += project["project"]["dependencies"]
+    if messages:
+        wanted += interface["project"]["dependencies"] + interface["build-system"]["requires"]
+        wanted += ["ninja", "cmake" + interface["tool"]["scikit-build"]["cmake"]["version"]]
+    return wanted
 
 
 def run(arguments: list[str]) -> None:
@@ -68,16 +72,15 @@ class Step:
     """Times a step and says so in one line."""
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        self.name, self.outcome = name, ""
 
     def __enter__(self) -> Step:
-        print(f"  {self.name} ...", end="", flush=True)
         self.begin = time.monotonic()
         return self
 
     def __exit__(self, kind: object, *rest: object) -> None:
         if kind is None:
-            print(f" {time.monotonic() - self.begin:.1f} s", flush=True)
+            print(f"  {self.name}: {time.monotonic() - self.begin:.1f} s{self.outcome}", flush=True)
 
 
 def read_stamp() -> dict:
@@ -96,50 +99,61 @@ def main() -> None:
     if not (3, 11) <= sys.version_info[:2] < (3, 13):
         sys.exit(f"make_venv: Python {sys.version.split()[0]} found, 3.11 or 3.12 wanted (make PYTHON=python3.12 ...)")
 
+    project = toml(ROOT)
     wanted = {
         "python": sys.version,
-        "libraries": digest(ROOT / "pyproject.toml", MESSAGES / "pyproject.toml", CONSTRAINTS),
+        "libraries": digest(project["project"], project["build-system"], CONSTRAINTS.read_text(encoding="utf-8")),
         "messages": digest(MESSAGES),
     }
     found = read_stamp()
     if found.get("python") != wanted["python"]:
         found = {}
-    extras = sorted(set(extras) | set(found.get("extras", [])))
-    wanted["extras"] = extras
+    wanted["extras"] = sorted({*extras, *found.get("extras", [])})
     if found == wanted:
         return
-    if found.get("messages") != wanted["messages"] and not (shutil.which("cc") and shutil.which("c++")):
+    install(found, wanted)
+
+
+def install(found: dict, wanted: dict) -> None:
+    """Install what differs between what was found and what is wanted."""
+    base = found.get("libraries") != wanted["libraries"]
+    messages = found.get("messages") != wanted["messages"]
+    extras = [e for e in wanted["extras"] if base or e not in found["extras"]]
+    if messages and not (shutil.which("cc") and shutil.which("c++")):
         sys.exit("make_venv: no C and C++ compiler (cc, c++) found; the ROS messages are compiled on this machine")
 
-    print("Installing into .venv")
+    print("Installing into .venv", flush=True)
     begin = time.monotonic()
     if not found:
-        with Step("making a virtual environment"):
+        with Step("virtual environment"):
             venv.EnvBuilder(clear=VENV.exists(), with_pip=True).create(VENV)
     STAMP.unlink(missing_ok=True)
-
-    install, build = requirements(extras)
-    with Step("downloading (the network's share)"):
-        run([*PIP, "wheel", "--wheel-dir", str(WHEELS), "--constraint", str(CONSTRAINTS), *install, *build])
-    size = sum(p.stat().st_size for p in WHEELS.iterdir()) / 1e6
-    print(f"    {len(list(WHEELS.iterdir()))} packages, {size:.0f} MB")
-
-    # From here on without the network; the isolated builds inherit both settings.
-    os.environ |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": WHEELS.as_uri()}
     constrained = ["--constraint", str(CONSTRAINTS)]
-    building = None
-    if found.get("messages") != wanted["messages"]:
-        building = subprocess.Popen([*PIP, "wheel", "--no-deps", "--wheel-dir", str(WHEELS), str(MESSAGES)], cwd=ROOT)
-    with Step("installing libraries and turnmill"):
-        run([*PIP, "install", *constrained, "--editable", f".[{','.join(extras)}]"])
-    if building is not None:
-        with Step("compiling the messages (began with the libraries)"):
-            if building.wait():
-                sys.exit(f"make_venv: the messages did not build (exit code {building.returncode})")
-            run([*PIP, "install", *constrained, "--force-reinstall", "--no-deps", "turnmill_msgs"])
+    with Step("download (the network's share)") as step:
+        run([*PIP, "wheel", "--wheel-dir", str(WHEELS), *constrained, *requirements(extras, base, messages)])
+        size = sum(p.stat().st_size for p in WHEELS.iterdir()) / 1e6
+        step.outcome = f" for {len(list(WHEELS.iterdir()))} packages, {size:.0f} MB"
+
+    # From here on without the network; isolated builds inherit both settings.
+    os.environ |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": WHEELS.as_uri()}
+    build = [*PIP, "wheel", "--no-deps", "--wheel-dir", str(WHEELS), str(MESSAGES)]
+    building = subprocess.Popen(build, cwd=ROOT) if messages else None
+    try:
+        with Step("libraries and turnmill"):
+            every = ",".join(wanted["extras"])
+            run([*PIP, "install", "--no-compile", *constrained, "--editable", f".[{every}]"])
+        if building:
+            with Step("messages (compiled meanwhile)"):
+                if building.wait():
+                    sys.exit(f"make_venv: the messages did not build (exit code {building.returncode})")
+                run([*PIP, "install", *constrained, "--force-reinstall", "--no-deps", "turnmill_msgs"])
+    finally:
+        if building and building.poll() is None:
+            building.terminate()
+            building.wait()
     shutil.rmtree(WHEELS)
     STAMP.write_text(json.dumps(wanted), encoding="utf-8")
-    print(f"  ready after {time.monotonic() - begin:.1f} s")
+    print(f"  ready after {time.monotonic() - begin:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -22,9 +22,9 @@ HEADER = """\
 
 def main() -> None:
     """Resolve and print."""
-    install, build = requirements(["ros", "dev"])
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "pip", "--quiet", "wheel", "--wheel-dir", folder, *install, *build]
+        wanted = requirements(["ros", "dev"])
+        command = [sys.executable, "-m", "pip", "--quiet", "wheel", "--wheel-dir", folder, *wanted]
         code = subprocess.run(command, cwd=ROOT, check=False, stdout=sys.stderr).returncode
         if code:
             sys.exit(code)
