@@ -81,7 +81,8 @@ class _Nodes:
         """Take nodes through a transition; returns those that refused."""
         failed = []
         for name in names:
-            if isinstance(self._nodes[name], LifecycleNode):
+            if isinstance(self._nodes[name], LifecycleNode) and (
+                    transition != "deactivate" or support.is_active(self._nodes[name])):
                 done = getattr(self._nodes[name], f"trigger_{transition}")()
                 failed += [name] if done != TransitionCallbackReturn.SUCCESS else []
         return failed
@@ -89,6 +90,12 @@ class _Nodes:
     def failures(self) -> dict[str, str]:
         """Nodes that failed, and why."""
         return {name: node.diagnostics.failure for name, node in self._nodes.items() if node.diagnostics.failure}
+
+    def hurry(self) -> None:
+        """Let go of computations that wait."""
+        for node in self._nodes.values():
+            if hasattr(node, "hurry"):
+                node.hurry()
 
     def close(self, deadline: float) -> None:
         """Destroy the nodes."""
@@ -119,7 +126,7 @@ class _Processes:
 
     def change(self, names: Sequence[str], transition: str, deadline: float) -> list[str]:
         """Take nodes through a transition, all at once; returns those that refused or did not answer in time."""
-        names = [name for name in names if name in self._lifecycle]
+        names = [name for name in names if name in self._lifecycle and name not in self._codes]
         waiting = set(names)
         asked: dict[str, Any] = {}
         while waiting and time.monotonic() < deadline and not self.failures().keys() & waiting:
@@ -138,6 +145,9 @@ class _Processes:
                 how = f"ended by signal {-process.returncode}" if process.returncode < 0 else "ended"
                 self._codes[name] = f"the process {how} with exit code {process.returncode}"
         return {**self._codes, **self._manager.errors}
+
+    def hurry(self) -> None:
+        """Computations that wait are let go of at the SIGINT of `close`."""
 
     def close(self, deadline: float) -> None:
         """End the processes: SIGINT, then SIGKILL at the deadline."""
@@ -220,6 +230,8 @@ class _Run:
             interrupted, length = self._stop.is_set(), time.monotonic() - begun
         finally:
             budget = INTERRUPT_DEADLINE_S if self._stop.is_set() else FINISH_DEADLINE_S
+            if self._stop.is_set():
+                self._nodes.hurry()
             self._finish(time.monotonic() + budget)
         failures = {**self._manager.errors, **failures}
         if failures:

@@ -6,7 +6,7 @@ The graph, the launch files and the documentation are made from it; nothing here
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from turnmill_ros.topics import (
@@ -78,21 +78,27 @@ KINDS = {kind.name: kind for kind in (
 class NodeSpec:
     """One node of a graph and the parameters that it is started with.
 
-    silent: output topics that this run does not use, for example an operation that another node publishes.
+    unused: topics of the node that this run does without, for example an operation that another node publishes;
+    match: further counterparts that the node waits for, as topic=count.
     """
 
     kind: NodeKind
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    silent: tuple[Topic, ...] = ()
+    unused: tuple[Topic, ...] = ()
+    match: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """Name of the node."""
         return self.kind.name
 
+    def inputs(self) -> tuple[Topic, ...]:
+        """Topics that the node reads in this run."""
+        return tuple(topic for topic in self.kind.inputs if topic not in self.unused)
+
     def outputs(self) -> tuple[Topic, ...]:
         """Topics that the node writes in this run."""
-        return tuple(topic for topic in self.kind.outputs if topic not in self.silent)
+        return tuple(topic for topic in self.kind.outputs if topic not in self.unused)
 
 
 def with_matches(specs: Iterable[NodeSpec], watched: Iterable[Topic] = ()) -> tuple[NodeSpec, ...]:
@@ -107,10 +113,10 @@ def with_matches(specs: Iterable[NodeSpec], watched: Iterable[Topic] = ()) -> tu
         if spec.kind.role == "server":
             matched.append(spec)
             continue
-        readers = {t.name: sum(t in other.kind.inputs for other in specs) + (t in watched) for t in spec.outputs()}
-        writers = {t.name: sum(t in other.outputs() for other in specs) for t in spec.kind.inputs}
-        match = [f"{name}={count}" for name, count in {**readers, **writers}.items() if count]
-        matched.append(NodeSpec(spec.kind, {**spec.parameters, "match": match}, spec.silent))
+        readers = {t.name: sum(t in other.inputs() for other in specs) + (t in watched) for t in spec.outputs()}
+        writers = {t.name: sum(t in other.outputs() for other in specs) for t in spec.inputs()}
+        match = [*(f"{name}={count}" for name, count in {**readers, **writers}.items() if count), *spec.match]
+        matched.append(replace(spec, parameters={**spec.parameters, "match": match}))
     return tuple(matched)
 
 
@@ -143,12 +149,14 @@ def replay_specs(
     """Nodes of a replay. rate: 0 is maximum speed; prior, axes: parameters of the chatter monitor."""
     common = {"use_sim_time": True, "lossless": True}
     silent = () if operation_text is None else (OPERATION,)
+    recorded = (f"{recorded_name(CHATTER_STATE.name)}=1",) if prior == "recorded" else ()
+    playing = {"bag": bag, "rate": float(rate), "exclude": ["", *(topic.name for topic in silent)]}
     chosen = [
-        NodeSpec(KINDS["player"], {"bag": bag, "rate": float(rate), "exclude": ["", *(t.name for t in silent)]},
-                 silent),
+        NodeSpec(KINDS["player"], playing, silent, recorded),
         NodeSpec(KINDS["force_predictor"], common),
         NodeSpec(KINDS["stability_monitor"], {**common, "every_change": rate == 0.0}),
-        NodeSpec(KINDS["chatter_monitor"], {**common, "prior": prior, "axes": axes}),
+        NodeSpec(KINDS["chatter_monitor"], {**common, "prior": prior, "axes": axes},
+                 () if prior == "live" else (STABILITY_MARGIN,), recorded),
     ]
     if operation_text is not None:
         chosen.append(NodeSpec(KINDS["operation_server"], {"operation_text": operation_text, "use_sim_time": True}))

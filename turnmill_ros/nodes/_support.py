@@ -253,10 +253,15 @@ def start(node: LifecycleNode) -> bool:
             and node.trigger_activate() == TransitionCallbackReturn.SUCCESS)
 
 
+def is_active(node: LifecycleNode) -> bool:
+    """Whether a lifecycle node is active."""
+    return bool(node._state_machine.current_state[1] == "active")
+
+
 def stop(node: Node) -> None:
     """Deactivate and clean up a lifecycle node, from whichever state it is in."""
     if isinstance(node, LifecycleNode):
-        if node._state_machine.current_state[1] == "active":
+        if is_active(node):
             node.trigger_deactivate()
         if node._state_machine.current_state[1] == "inactive":
             node.trigger_cleanup()
@@ -267,9 +272,15 @@ def main(create: Callable[[], Any]) -> None:
 
     A lifecycle node starts by itself where its parameter `autostart` is true. Exit code 1 after a failure.
     """
-    ending = threading.Event()
+    ending, node = threading.Event(), None
+
+    def end(*_: object) -> None:
+        ending.set()
+        if hasattr(node, "hurry"):
+            node.hurry()
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ending.set())
+        signal.signal(number, end)
     parent = os.environ.get(PARENT_VARIABLE)
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
+import threading
+from concurrent.futures import Future, wait
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ from turnmill_ros.conversions import axes_from_message, lobes_to_message, margin
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.node_table import MARGIN_PLOTS
 from turnmill_ros.nodes import _support as support
+from turnmill_ros.nodes._worker import Worker
 from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.parameters import declare
 
@@ -72,7 +74,7 @@ class StabilityMonitor(LifecycleNode):
         self._pending: list[Future[None]] = []
         self._drawn: set[tuple[str, float]] = set()
         self._received = self._evaluated = self._sent = self._left_out = 0
-        self._worker = ThreadPoolExecutor(1, "stability")
+        self._worker, self._hurried = Worker("stability"), threading.Event()
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.STABILITY_MARGIN, topics.STABILITY_LOBES, *MARGIN_PLOTS)}
         self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
@@ -96,17 +98,26 @@ class StabilityMonitor(LifecycleNode):
         """Wait for axis states."""
         support.wait_until_matched(self, self._match)
         self._next_ns = 0
+        self._hurried.clear()
         self.diagnostics.enter(support.ACTIVE)
 
     @support.transition
     def on_deactivate(self, state: LifecycleState) -> None:
-        """Finish what was begun (live: drop what was not), then stop."""
+        """Finish what was begun (in a replay: all that has arrived), then stop."""
         support.drain(self)
-        for pending in self._pending:
-            if self._every or not pending.cancel():
-                pending.result()
+        if not self._every:
+            self.hurry()
+        while wait(self._pending, 0.1).not_done:
+            if self._hurried.is_set():
+                break
         support.wait_until_acknowledged(self)
         self.diagnostics.enter("stopped", done=True)
+
+    def hurry(self) -> None:
+        """Leave out all cuts that wait, and do not wait for what is being computed."""
+        self._hurried.set()
+        for pending in self._pending:
+            pending.cancel()
 
     def on_axes(self, message: Any) -> None:
         """Judge the cut of an axis state, if it is time to."""
@@ -195,6 +206,8 @@ class StabilityMonitor(LifecycleNode):
             limit_frequency=found.limit_frequency if found else np.nan)
 
     def _publish(self, operation: Operation, margin: Margin, stamp_ns: int) -> None:
+        if self._hurried.is_set():
+            return
         types = ros_types()
         message = margin_to_message(margin, stamp_ns, operation.sha256, types)
         support.send(self._out[topics.STABILITY_MARGIN], message)
@@ -210,9 +223,16 @@ class StabilityMonitor(LifecycleNode):
         self._drawn.add(key)
         speeds = operation.conditions.tool_speed * np.linspace(0.7, 1.3, self._lobe_points)
         depths = np.linspace(0.0, searched_depth(operation, cut), 13)[1:]
-        lobes = stability_lobes(operation, speeds, depths, cut.workpiece_speed)
+        try:
+            lobes = stability_lobes(operation, speeds, depths, cut.workpiece_speed, self._go_on)
+        except InterruptedError:
+            return
         support.send(self._out[topics.STABILITY_LOBES],
                      lobes_to_message(lobes, stamp_ns, operation.sha256, ros_types()))
+
+    def _go_on(self, done: int, total: int) -> None:
+        if self._hurried.is_set():
+            raise InterruptedError
 
     def _values(self) -> dict[str, object]:
         return {"joint_states_received": self._received, "margins_sent": self._sent, "cuts_evaluated": self._evaluated,
