@@ -18,7 +18,7 @@ from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.prediction import PredictedType, Prior
-from turnmill_core.stability.margin import stability_lobes, stability_margin
+from turnmill_core.stability.margin import Lobes, Margin
 from turnmill_ros import conversions
 from turnmill_ros.decoding import decoder
 from turnmill_ros.interfaces import own_texts, ros_types, rosbags_types, schema_text, typestore
@@ -192,8 +192,12 @@ def test_values_of_the_core_have_the_fields_of_their_messages():
     operation = read_operation(shipped_operations()["milling_benchmark_1dof"])
     cut = operation.conditions
     loads = cutting_loads(operation, cut, angles=36)
-    margin = stability_margin(operation, cut, depth_search=2e-3, speed_search=False)
-    lobes = stability_lobes(operation, [cut.tool_speed, 1.1 * cut.tool_speed], [1e-4, 1e-3])
+    margin = Margin(
+        tool_speed=500.0, workpiece_speed=0.0, depth=1e-3, depth_limit=5e-4, stable_depths=np.array([[0.0, 5e-4]]),
+        depth_searched=2e-3, depth_ratio=2.0, spectral_radius=1.4, multipliers=np.array([1 + 1j, 1 - 1j]),
+        predicted_type=PredictedType.HOPF, chatter_frequency=950.0, principal_period=6e-3, delay=6e-3,
+        nearest_stable_speed=np.nan, limit_type=PredictedType.HOPF, limit_frequency=940.0)
+    lobes = Lobes(**vars(_lobes()))
     for value, make, back in (
         (loads, conversions.loads_to_message, conversions.loads_from_message),
         (margin, conversions.margin_to_message, conversions.margin_from_message),
