@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from turnmill_core.monitoring.confidence import confidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
-from turnmill_core.monitoring.gate import Background
+from turnmill_core.monitoring.gate import Background, plain_comb
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 from turnmill_core.prediction import PredictedType, Prior
+
+TRANSIENT = math.log(2.0)
+"""A change of the synchronous amplitude between the halves of a window, up or down, that shows entry or exit."""
 
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
@@ -39,6 +42,9 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
                          ratio, half, confidence(f, ratio, half))
     kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior)
+    if not chattering and kind is not ChatterKind.STABLE and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT:
+        kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
+        text = f"entry or exit: the tooth passing harmonics change {f.change:.2g}-fold within the window; else {text}"
     return Judgement(kind, reason, text, ratio, half, confidence(f, ratio, half))
 
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
 
 from turnmill_core.monitoring.separation import (
+    Drift,
     Layout,
     Prepared,
     Synchronous,
+    drift,
+    followed,
     harmonic_noise,
     lay_out,
     sinusoids,
-    speed_error,
     synchronous,
     uniform_in_time,
 )
@@ -25,6 +30,13 @@ LINE_RATIO = 16.0
 
 STRONG = 0.02
 """Asynchronous lines above this share of the energy are taken out before the synchronous part is averaged."""
+
+
+PHASE = 0.004
+"""Drift of the first tooth passing harmonic over a window [revolutions of its phase] that is worth correcting."""
+
+LARGEST_RAMP = 0.01
+"""Largest relative change of the speed over a window that is followed by the signal alone."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,8 @@ class Features:
     frequency: spindle frequency [Hz]; speed_ratio: refined over assumed speed; tooth: energy at
     tooth passing harmonics; synchronous: at all spindle harmonics; half: half-order lines; comb:
     number of tooth passing harmonics above the noise, of comb_of looked at; noise: broadband
-    energy; energy: all energy in the band; lines: asynchronous lines, strongest first; chatter: the
+    energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
+    second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
     family of the strongest, if any.
     """
 
@@ -72,6 +85,7 @@ class Features:
     comb_of: int
     noise: float
     energy: float
+    change: float
     lines: tuple[Line, ...]
     chatter: ChatterFamily | None
 
@@ -91,11 +105,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
     [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`.
     """
-    parts = _separate(p, turns * ratio, steady, teeth, lowest)
-    better = float(np.clip(ratio * (1 + _speed_error(parts, p, teeth)), *band))
-    if abs(better / ratio - 1) * parts.layout.revolutions * teeth > 0.004:
-        ratio = better
-        parts = _separate(p, turns * ratio, steady, teeth, lowest)
+    parts, ratio = _followed(p, turns, steady, teeth, lowest, ratio, band)
     layout, found = parts.layout, parts.residual
     tooth_frequency = teeth * layout.frequency
     noise = harmonic_noise(found, len(parts.one.mean), layout.frequency, 1, layout.duration)
@@ -105,7 +115,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     clear = np.where(inside & (energy > 4 * noise), energy - noise, 0.0)
     tooth = order % teeth == 0
     first = np.flatnonzero(tooth & inside)[:12]
-    asynchronous = lines(found, lowest, LINE_RATIO, 24)
+    asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, energy))
     if teeth % 2:
         half = _half_odd(parts, p.top, teeth)
         asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))
@@ -116,7 +126,8 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     return Features(
         layout.frequency, ratio, float(clear[tooth].sum()), float(clear.sum()), half,
         int(np.sum(energy[first] > 10 * noise[first])), len(first), noise_energy,
-        float(found.power[low:].sum() + energy[inside].sum()), asynchronous,
+        float(found.power[low:].sum() + energy[inside].sum()), _change(parts, np.flatnonzero(tooth & inside), noise),
+        asynchronous,
         _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest),
     )
 
@@ -148,10 +159,35 @@ def _distance(x: float) -> float:
     return abs(x - round(x))
 
 
-def _speed_error(parts: _Parts, p: Prepared, teeth: int) -> float:
+def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
+              band: tuple[float, float]) -> tuple[_Parts, float]:
+    """Separation at the speed, and with the ramp, that the tooth passing harmonics show; and the mean speed's ratio."""
+    assumed = turns * ratio
+    parts = _separate(p, assumed, steady, teeth, lowest)
+    length = parts.layout.revolutions
+    for _ in range(2):
+        error = float(np.clip(ratio * (1 + _drift(parts, p, teeth).speed), *band)) / ratio - 1
+        if abs(error) * length * teeth < PHASE:
+            break
+        assumed, ratio = followed(assumed, length, Drift(error)), ratio * (1 + error)
+        parts = _separate(p, assumed, steady, teeth, lowest)
+    for _ in range(2):
+        found = _drift(parts, p, teeth)
+        ramp = min(LARGEST_RAMP / length, max(-LARGEST_RAMP / length, found.ramp))
+        if abs(ramp) * length**2 / 4 * teeth < PHASE:
+            break
+        assumed = followed(assumed, length, Drift(0.0, ramp))
+        better = _separate(p, assumed, False, teeth, lowest)
+        if better.residual.power.sum() > 0.9 * parts.residual.power.sum():
+            break
+        parts = better
+    return parts, ratio
+
+
+def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
     noise = harmonic_noise(parts.residual, len(parts.one.mean), parts.layout.frequency, 1, parts.layout.duration)
     harmonics = np.arange(teeth, min(len(parts.one.mean), int(p.top / parts.layout.frequency)), teeth)
-    return speed_error(parts.one, harmonics, noise[harmonics])
+    return drift(parts.layout, parts.values, harmonics, noise[harmonics])
 
 
 def _half_odd(parts: _Parts, top: float, teeth: int) -> HalfOrder:
@@ -168,6 +204,29 @@ def _half(frequencies: Array, energy: Array) -> HalfOrder:
     if not len(seen):
         return HalfOrder(0.0)
     return HalfOrder(float(energy.sum()), float(frequencies[np.argmax(energy)]), tuple(frequencies[seen].tolist()))
+
+
+def _change(parts: _Parts, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
+    """Amplitude of the harmonics in the second half of the window over the first; no less than the noise's."""
+    table = parts.values.reshape(parts.layout.revolutions, parts.layout.points)
+    half = len(table) // 2
+    least = 2 * float(noise[harmonics].sum())
+    early, late = (float(np.sum(np.abs(fft.rfft(part.mean(axis=0))[harmonics]) ** 2)) * 2 / parts.layout.points**2
+                   for part in (table[:half], table[-half:]))
+    return math.sqrt(max(late, least) / max(early, least)) if least > 0 else 1.0
+
+
+def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
+    """True for what a stronger spindle harmonic leaves on both sides of itself where its amplitude or phase varies.
+
+    Such skirts lie within two bins of the harmonic and are alike on either side; a chatter line is not.
+    """
+    harmonic = round(x.frequency / layout.frequency)
+    offset = x.frequency - harmonic * layout.frequency
+    if harmonic >= len(energy) or abs(offset) > 2 * s.resolution or energy[harmonic] < x.energy:
+        return False
+    here, mirror = near(s.power, s, harmonic * layout.frequency + np.array([offset, -offset]), 0.5 * s.resolution)
+    return bool(mirror > 0.25 * here)
 
 
 def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> bool:

@@ -150,25 +150,52 @@ def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Ar
     return found
 
 
-def speed_error(s: Synchronous, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
-    """Relative error of the assumed speed: true speed = assumed (1 + error).
+@dataclass(frozen=True)
+class Drift:
+    """Departure of the tool's rotation from the assumed one, in turns from the window's middle.
 
-    A wrong speed turns the phase of harmonic h by 2 pi h error each revolution, which shows as a
-    trend in quadrature to the mean. harmonics: indices into mean and trend; noise: mean square
-    that noise alone gives each. Weighted median over the harmonics above ten times the noise (weight:
-    the order, a line near one harmonic moves it little); 0 without any.
+    True turns = turns (1 + speed) + ramp turns^2; speed: relative error of the speed; ramp: half its change per revolution.
     """
-    a, b = s.mean[harmonics], s.trend[harmonics]
-    power = np.abs(a) ** 2
+
+    speed: float = 0.0
+    ramp: float = 0.0
+
+
+def drift(layout: Layout, values: Array, harmonics: NDArray[np.integer[Any]], noise: Array) -> Drift:
+    """Drift seen in the phases of the harmonics (multiples of the spindle frequency).
+
+    A wrong speed turns the phase of harmonic h by 2 pi h error each revolution, a wrong ramp bends
+    it. Per harmonic from least squares over the revolutions (mean, trend, bend), then weighted
+    medians over the harmonics above the noise, so that a line near one harmonic moves it little;
+    noise: mean square that noise alone gives each. Zero without any such harmonic.
+    """
+    table = values.reshape(layout.revolutions, layout.points)
+    r = np.arange(layout.revolutions) - (layout.revolutions - 1) / 2
+    basis = np.stack([np.ones_like(r), r, r**2 - np.mean(r**2)])
+    fitted = fft.rfft((basis @ table) / np.sum(basis**2, axis=1)[:, None], axis=1)[:, harmonics] * (2 / layout.points)
+    power = np.abs(fitted[0]) ** 2
     use = power > 20 * noise
     if not use.any():
-        return 0.0
-    order = harmonics[use] / s.period
-    errors = np.imag(np.conj(a[use]) * b[use]) / (2 * math.pi * order * power[use])
-    weight = order * np.minimum(1.0, np.sqrt(power[use] / np.median(power[use])))
-    ascending = np.argsort(errors, kind="stable")
+        return Drift()
+    a, b, c = fitted[:, use]
+    power, order = power[use], harmonics[use]
+    weight = order * np.minimum(1.0, np.sqrt(power / np.median(power)))
+    scale = 2 * math.pi * order * power
+    return Drift(_weighted_median(np.imag(np.conj(a) * b) / scale, weight),
+                 _weighted_median(np.imag(np.conj(a) * c) / scale, weight))
+
+
+def _weighted_median(values: Array, weight: Array) -> float:
+    ascending = np.argsort(values, kind="stable")
     passed = np.cumsum(weight[ascending])
-    return float(errors[ascending][np.searchsorted(passed, passed[-1] / 2)])
+    return float(values[ascending][np.searchsorted(passed, passed[-1] / 2)])
+
+
+def followed(turns: Array, revolutions: int, found: Drift) -> Array:
+    """Turns corrected by a drift found in the newest `revolutions`."""
+    since = turns - (turns[-1] - revolutions / 2)
+    corrected: Array = turns + found.speed * since + found.ramp * since**2
+    return corrected
 
 
 def uniform_in_time(layout: Layout, values: Array, rate: float) -> tuple[Array, float]:
