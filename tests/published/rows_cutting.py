@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from tests.published.row import Row
+from turnmill_core.cutting.bottom import bottom_loads
 from turnmill_core.cutting.chip import (
     exact_chip,
     feed_per_tooth,
@@ -18,6 +19,7 @@ from turnmill_core.cutting.chip import (
     tool_speed_for_cutting_speed,
     tool_speed_for_feed_per_tooth,
 )
+from turnmill_core.cutting.coefficients import orthogonal_data
 from turnmill_core.cutting.engagement import cutting_time_share, engagement, removal
 from turnmill_core.cutting.feed import feed_angle, to_feed_frame
 from turnmill_core.cutting.forces import Revolution, revolution
@@ -31,7 +33,7 @@ ANGLES, ELEMENTS = 1440, 200
 
 def rows() -> list[Row]:
     """Every number of thesis chapter 3 and section 5 that this room computes."""
-    return [*table_31(), *table_32(), *chapter_5()]
+    return [row._replace(computed=float(row.computed)) for row in (*table_31(), *table_32(), *chapter_5())]
 
 
 def load(name: str, helix_deg: float | None = None) -> Operation:
@@ -60,7 +62,17 @@ def table_31() -> list[Row]:
     tool_frame = "same forces, x_T on the machine's axis: turned by the feed angle of 0.35 deg"
     ratio = "no definition tried gives 0.1963"
     share, share_straight = (cutting_time_share(o, o.conditions) for o in (op, straight))
+    m = op.material
+    _, flow = orthogonal_data((m.Ktc, m.Krc, m.Kac), math.radians(5), math.radians(25), math.radians(30))
+    bottom = bottom_loads(op, op.conditions, ANGLES)
     result = [
+        Row("chip flow angle behind K_tc, K_rc, K_ac", at, 25, math.degrees(flow), "deg",
+            "the printed coefficients, 5 deg rake and 25 deg helix return Stabler's rule (flow = helix) only with the "
+            "minus of erratum M8 in Eq. 3.47"),
+        Row("Fz mean, side edges", at, "figure only", force[:, 2].mean(), "N",
+            "the thesis' model; it names the missing bottom and axial runout as the cause of its 35 % error"),
+        Row("Fz mean, side and bottom edges", at, "figure only", force[:, 2].mean() + bottom.force_tool[:, 2].mean(),
+            "N", "bottom edges with the side's coefficients, for a flat end: a dish angle makes it less"),
         Row("largest chip", at, "figure only", turn.chip_thickness_max * 1e3, "mm", "Eq. 3.44 (erratum M6)"),
         Row("largest chip, exact", at, "figure only", exact.chip_thickness_max * 1e3, "mm",
             "trochoid and previous revolution's wall"),

@@ -70,6 +70,7 @@ def test_zeros_and_coarse_references(table: dict[tuple[str, str], Row]) -> None:
     assert table["Table 3.1", "Fx largest"].computed == 0
     assert table["Table 3.1", "exit angle at 1 mm"].computed == 0
     assert table["Table 3.1", "tool torque, peak"].computed == pytest.approx(2.5, abs=0.05)  # given to two digits
+    assert table["Table 3.1", "chip flow angle behind K_tc, K_rc, K_ac"].computed == pytest.approx(25, abs=0.2)
     assert table["Table 3.1", "volume through the tool's bottom"].computed == pytest.approx(14, abs=0.5)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turnmill_core.cutting.bottom import bottom_loads
 from turnmill_core.cutting.chip import ChipModel, prepare_cut
 from turnmill_core.cutting.engagement import Engagement, bottom_rate, engagement, removal_rate
 from turnmill_core.cutting.forces import revolve
@@ -31,7 +32,7 @@ class CuttingLoads:
 
     For pictures: angle [rad] (n,), force_tool [N] (n, 3), tool_torque [N m] (n,), workpiece_torque
     [N m] (n,) over the revolution; engagement, the arcs by height; bottom_share [1], share of the
-    removed volume that enters through the tool's bottom and is not in the forces.
+    removed volume that enters through the tool's bottom; its forces are added on request only.
     """
 
     force_tool_mean: Array
@@ -59,7 +60,8 @@ class CuttingLoads:
 
 
 def cutting_loads(
-    op: Operation, conditions: Conditions, angles: int = 360, elements: int = 64, chip: ChipModel = "static"
+    op: Operation, conditions: Conditions, angles: int = 360, elements: int = 64, chip: ChipModel = "static",
+    bottom: bool = False,
 ) -> CuttingLoads:
     """Loads over one tool revolution at `conditions`.
 
@@ -71,6 +73,7 @@ def cutting_loads(
         angles: number of angles n of the revolution.
         elements: number of axial elements m of the edges.
         chip: `static` (Eq. 3.44) or `exact`.
+        bottom: add the forces of the bottom edges (see bottom.py); the thesis' forces are without.
 
     Raises:
         ValueError: the depth exceeds the flute length.
@@ -85,6 +88,14 @@ def cutting_loads(
         tool_torque, workpiece_torque = turn.tool_torque, turn.workpiece_torque
         force_mean = mean.force_tool.mean(axis=0)
         tool_torque_mean, workpiece_torque_mean = float(mean.tool_torque.mean()), float(mean.workpiece_torque.mean())
+        if bottom:
+            below = bottom_loads(op, conditions, angle.size)
+            force, tool_torque = force + below.force_tool, tool_torque + below.tool_torque
+            workpiece_torque = workpiece_torque + below.workpiece_torque
+            force_mean = force_mean + below.force_tool.mean(axis=0)
+            tool_torque_mean += float(below.tool_torque.mean())
+            workpiece_torque_mean += float(below.workpiece_torque.mean())
+            chip_max = max(chip_max, below.chip_thickness_max)
         rate = removal_rate(op, conditions)
         bottom_share = bottom_rate(op, conditions) / rate
     else:
