@@ -47,21 +47,24 @@ def _ramp(u: float) -> float:
 
 
 @njit(cache=True)
-def _cubic(row: Floats, position: float) -> float:
-    """Value of the periodic table `row` at a fractional `position` (four-point Lagrange)."""
-    cells = row.shape[0]
+def _left(rows: Floats, position: float, sin: float, cos: float) -> float:
+    """Surface [m] seen along (sin, cos) at a fractional `position` of the periodic table rows (cells, 2).
+
+    Four-point Lagrange interpolation.
+    """
+    cells = rows.shape[0]
     base = math.floor(position)
     t = position - base
-    i = int(base) % cells
-    m = row[i - 1 if i > 0 else cells - 1]
-    a = row[i]
-    b = row[i + 1 if i + 1 < cells else i + 1 - cells]
-    c = row[i + 2 if i + 2 < cells else i + 2 - cells]
     s = 1.0 - t
-    return (
-        -t * s * (1.0 + s) / 6.0 * m + (1.0 + t) * s * (1.0 + s) / 2.0 * a
-        + (1.0 + t) * t * (1.0 + s) / 2.0 * b - (1.0 + t) * t * s / 6.0 * c
-    )
+    b = int(base) % cells
+    a = b - 1 if b > 0 else cells - 1
+    c = b + 1 if b + 1 < cells else 0
+    d = c + 1 if c + 1 < cells else 0
+    wa, wb = -t * s * (1.0 + s) / 6.0, (1.0 + t) * s * (1.0 + s) / 2.0
+    wc, wd = (1.0 + t) * t * (1.0 + s) / 2.0, -(1.0 + t) * t * s / 6.0
+    x = wa * rows[a, 0] + wb * rows[b, 0] + wc * rows[c, 0] + wd * rows[d, 0]
+    y = wa * rows[a, 1] + wb * rows[b, 1] + wc * rows[c, 1] + wd * rows[d, 1]
+    return x * sin + y * cos
 
 
 @njit(cache=True)
@@ -74,7 +77,7 @@ def _hermite(a: float, va: float, b: float, vb: float, h: float, u: float) -> fl
 @njit(cache=True)
 def _cut(
     now: Floats, turned: float, psi: float, px: float, py: float, tooth_angle: Floats, pitch: Floats, runout: Floats,
-    shape: Floats, coefficients: Floats, surface: Floats, place: Floats, force: Floats,
+    shape: Floats, coefficients: Floats, contact: bool, surface: Floats, place: Floats, force: Floats,
 ) -> float:
     """Cutting force on the tool [N] (3,) for the displacement px, py [m]; returns the largest chip [m].
 
@@ -82,9 +85,10 @@ def _cut(
     tool in the material. place (teeth, slices, 4) receives what _leave_surface needs: sine and
     cosine of the tooth's angle, middle height of the engaged part of the slice [m] (-1: no chip is
     cut), and 1 near the cut, else 0. Entry and exit are averaged with a hat of one step's width,
-    which keeps impulse and moment of the force when an edge falls inside a step.
+    which keeps impulse and moment of the force when an edge falls inside a step. contact: a chip is
+    never negative; without it the force stays linear.
     """
-    teeth, slices, cells = surface.shape
+    teeth, slices, cells, _ = surface.shape
     radius, bar_radius, lag_per_depth = shape
     cell = 2.0 * math.pi / cells
     depth = max(0.0, now[DEPTH])
@@ -125,9 +129,9 @@ def _cut(
             height = 0.5 * (low + high)
             place[j, s, 2] = height
             feed = (now[FEED_X] + now[FEED_X_SLOPE] * height) * sin + now[FEED_Y] * cos
-            left = _cubic(surface[ahead, s], (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell)
+            left = _left(surface[ahead, s], (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell, sin, cos)
             h = runout[j] + px * sin + py * cos + feed * period - left
-            if h <= 0.0:
+            if contact and h <= 0.0:
                 continue
             chip = max(chip, h)
             tangential = width * (coefficients[0] * h + coefficients[3])
@@ -141,16 +145,20 @@ def _cut(
 @njit(cache=True)
 def _leave_surface(
     now: Floats, turned: float, dt: float, psi0: float, psi1: float, depth0: float, motion: Floats,
-    tooth_angle: Floats, pitch: Floats, runout: Floats, lag_per_depth: float, place: Floats, surface: Floats,
+    tooth_angle: Floats, pitch: Floats, runout: Floats, lag_per_depth: float, contact: bool, place: Floats,
+    surface: Floats,
 ) -> None:
     """Store the surface that each tooth leaves at every node of material angle passed in the step.
 
+    surface (teeth, slices, cells, 2) [m]: where the edge was that cut it last, as displacement x, y of
+    the tool against the material, moved on by the feed of every pass that missed it. A later pass sees
+    it along its own normal, which is the chip n . (d(t) - d(t - tau)) of the linear theory.
     motion (2, 4): displacement x, y [m] and velocity x, y [m/s] at the beginning and the end of the
     step; psi0, psi1 and depth0, now[DEPTH]: angle in the material and depth there. Where no chip is
     due, the surface is taken to be where the edge is, so that material that comes into the cut looks
     as if the tooth before had left it.
     """
-    teeth, slices, cells = surface.shape
+    teeth, slices, cells, _ = surface.shape
     cell = 2.0 * math.pi / cells
     lag0 = lag_per_depth * depth0 / slices
     lag1 = lag_per_depth * max(0.0, now[DEPTH]) / slices
@@ -171,16 +179,15 @@ def _leave_surface(
                 cos_back = 1.0 - square / 2.0 * (1.0 - square / 12.0)
                 sin = place[j, s, 0] * cos_back - place[j, s, 1] * sin_back
                 cos = place[j, s, 1] * cos_back + place[j, s, 0] * sin_back
-                edge = (
-                    runout[j]
-                    + sin * _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
-                    + cos * _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
-                )
+                x = sin * runout[j] + _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
+                y = cos * runout[j] + _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 here = int(node) % cells
-                if place[j, s, 2] >= 0.0:
-                    feed = (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * sin + now[FEED_Y] * cos
-                    edge = max(edge, surface[ahead, s, here] - feed * period)
-                surface[j, s, here] = edge
+                if contact and place[j, s, 2] >= 0.0:
+                    old_x = surface[ahead, s, here, 0] - (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * period
+                    old_y = surface[ahead, s, here, 1] - now[FEED_Y] * period
+                    if (old_x - x) * sin + (old_y - y) * cos > 0.0:
+                        x, y = old_x, old_y
+                surface[j, s, here, 0], surface[j, s, here, 1] = x, y
                 node += 1.0
 
 
@@ -199,16 +206,16 @@ def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
 @njit(cache=True)
 def advance(
     first: int, dt: float, knots: Floats, modes: Floats, tooth_angle: Floats, pitch: Floats, runout: Floats,
-    shape: Floats, coefficients: Floats, modal: Floats, force: Floats, scalars: Floats, surface: Floats, raw: Floats,
-    marks_per_turn: int, marks: Floats,
+    shape: Floats, coefficients: Floats, contact: bool, modal: Floats, force: Floats, scalars: Floats,
+    surface: Floats, raw: Floats, marks_per_turn: int, marks: Floats,
 ) -> int:
     """Integrate the cut over len(raw) steps of `dt`, from step index `first`; returns the marks written.
 
     knots (K, 10): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
     (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m];
-    coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m].
+    coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m]; contact: the tool can leave the material.
     Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
-    surface (teeth, slices, cells) [m]. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
+    surface (teeth, slices, cells, 2) [m]. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
     displacement x, y, and largest chip since the last mark, at every 2 pi / marks_per_turn of the
     tool angle.
     """
@@ -248,7 +255,8 @@ def advance(
         chip = 0.0
         force[:] = 0.0
         if turning:
-            chip = _cut(now, turned, psi1, px, py, tooth_angle, pitch, runout, shape, coefficients, surface, place, force)
+            chip = _cut(now, turned, psi1, px, py, tooth_angle, pitch, runout, shape, coefficients, contact, surface,
+                        place, force)
 
         # The modes at the end of the step, the force linear over it.
         raw[i, :] = 0.0
@@ -271,7 +279,7 @@ def advance(
         _move(modes, modal, motion[1])
         if turning:
             _leave_surface(now, turned, dt, psi0, psi1, scalars[LAST_DEPTH], motion, tooth_angle, pitch, runout,
-                           shape[2], place, surface)
+                           shape[2], contact, place, surface)
 
         # Relative displacement at equal angles of the tool, for the truth.
         scalars[CHIP] = max(scalars[CHIP], chip)

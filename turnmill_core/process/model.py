@@ -30,7 +30,7 @@ class ProcessModel:
 
     dt [s]; modes (M, 16) and the surface's cells see _kernels; tooth_angle, pitch [rad], runout [m]
     (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), lag per height [rad/m]; coefficients (6,): Ktc, Krc,
-    Kac [Pa], Kte, Kre, Kae [N/m]; taps: anti-alias filter; columns: of the raw signals, one per
+    Kac [Pa], and per height instead of edge length Kte, Kre, Kae [N/m]; taps: anti-alias filter; columns: of the raw signals, one per
     channel; turns: tool revolutions in a principal period; uneven: the teeth are not equally spaced.
     """
 
@@ -65,7 +65,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
         runout=np.array(tool.runout or (0.0,) * tool.teeth),
         shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth]),
-        coefficients=np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae]),
+        coefficients=np.array([material.Ktc, material.Krc, material.Kac, *(edge / math.cos(tool.helix_angle) for edge in (
+            material.Kte, material.Kre, material.Kae))]),
         slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
         taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),
@@ -91,7 +92,7 @@ def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
 
 
 def _arc(op: Operation, conditions: Conditions) -> tuple[float, float, float, float, float]:
-    """Feed [m/s] along x_T and y_T and its slope along the tool axis [1/s], start and exit angle [rad] at the tip.
+    """Feed [m/s] along x_T and y_T and its slope along the tool axis [1/s], start and exit angle [rad].
 
     What cutting.feed and cutting.engagement say, without arrays (an axis state comes every few
     milliseconds), and as if the bar were wide: the kernel lets the cut end where the bar does.
@@ -108,7 +109,8 @@ def _arc(op: Operation, conditions: Conditions) -> tuple[float, float, float, fl
     if speed == 0:
         lower, upper = -radius, radius
     epsilon = math.atan2(conditions.feed_speed, speed * lever)
-    start, leave = (_crossing(y, radius, lever, conditions.feed_speed / speed if speed else 0.0, epsilon)
+    middle = lever + max(0.0, conditions.depth) / 2
+    start, leave = (_crossing(y, radius, middle, conditions.feed_speed / speed if speed else 0.0, epsilon)
                     for y in (upper, lower))
     if sense < 0:
         start, leave = math.pi - leave, math.pi - start

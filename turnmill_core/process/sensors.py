@@ -23,7 +23,7 @@ from turnmill_core.process import _kernels
 Floats = NDArray[np.float64]
 
 AIR_DENSITY = 1.204
-STOPBAND_DB = 80.0
+STOPBAND_DB = 84.0
 FRAME = 1024
 
 CHANNELS: dict[str, Channel] = {

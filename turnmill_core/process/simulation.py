@@ -40,7 +40,7 @@ class SimulationState:
 
     steps: index of the last integration step; base_ns: stamp of step 0; knot: last axis state as the
     integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (5,), surface
-    (teeth, slices, cells): see _kernels.advance; rows: raw signals that the anti-alias filter still
+    (teeth, slices, cells, 2): see _kernels.advance; rows: raw signals that the anti-alias filter still
     needs; next_sample: the sample that they centre on; samples: measured but not yet in a block;
     next_block: index of the block's first sample; background: last value of the noise filter; marks:
     displacements that the truth still needs, from the mark with index `mark_count` on.
@@ -87,8 +87,7 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
         require(np.shape(modal)[1:] == (2,) and np.shape(modal)[0] <= count, "modal state shape", np.shape(modal), "",
                 f"(at most {count}, 2)")
         start[: len(modal)] = modal
-    surface = np.empty((op.tool.teeth, model.slices, model.cells))
-    surface[:] = model.runout[:, None, None]
+    surface = np.zeros((op.tool.teeth, model.slices, model.cells, 2))
     half = len(model.taps) // 2
     return SimulationState(
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
@@ -184,7 +183,7 @@ def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) 
     if count:
         written = _kernels.advance(
             state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
-            model.coefficients, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
+            model.coefficients, config.loss_of_contact, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
         )
     advanced = replace(state, steps=state.steps + count, knot=knots[-1:], modal=modal, force=force, scalars=scalars,
                        surface=surface, rows=np.concatenate([state.rows, raw]))

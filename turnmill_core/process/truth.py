@@ -7,7 +7,7 @@ is fitted through the values of successive periods:
 
 - synchronous amplitude: rms over the angle of the lines' values in the middle of the window, less
   their mean (the static deflection);
-- asynchronous amplitude: rms of the residuals about the lines, with PERIODS - 2 degrees of freedom;
+- asynchronous amplitude: rms of the residuals about the lines;
 - half-order amplitude: the part of the synchronous amplitude at odd multiples of half the tooth
   passing frequency (no value where tooth spacing is uneven);
 - chatter frequency: of the strongest line of the residuals (x and y together).
@@ -110,7 +110,7 @@ def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, fl
     slope = np.tensordot(step, values, axes=(0, 0)) / np.sum(step**2)
     residual = values - mean - step[:, None, None] * slope
     synchronous = np.sqrt(np.sum(np.var(mean, axis=0)))
-    asynchronous = np.sqrt(np.sum(residual**2) / (length * (PERIODS - 2)))
+    asynchronous = np.sqrt(np.sum(residual**2) / (length * PERIODS))
     half = 0.0
     if half_order:
         lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
