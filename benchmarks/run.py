@@ -23,7 +23,8 @@ HERE = Path(__file__).resolve().parent
 def run_one(path: Path) -> dict[str, Any]:
     """Run one benchmark with --json; its figures, its wall time [s] and its peak memory [MB]."""
     begin = time.perf_counter()
-    with subprocess.Popen([sys.executable, path, "--json"], stdout=subprocess.PIPE, text=True, cwd=HERE.parent) as child:
+    command = [sys.executable, path, "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=HERE.parent) as child:
         assert child.stdout is not None
         text = child.stdout.read()
         _, status, usage = os.wait4(child.pid, 0)
