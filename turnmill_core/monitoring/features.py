@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from turnmill_core.monitoring.separation import (
+    LAYOUT,
     Drift,
     Layout,
     Prepared,
@@ -152,7 +153,7 @@ def _residual(layout: Layout, one: Synchronous, p: Prepared, steady: bool) -> Sp
     values = layout.values - one.wave
     if steady:
         return spectrum(values, layout.points * layout.frequency, p.top)
-    return spectrum(*uniform_in_time(layout, values, p.rate), p.top)
+    return spectrum(*uniform_in_time(layout, values, LAYOUT * p.top), p.top)
 
 
 def _distance(x: float) -> float:

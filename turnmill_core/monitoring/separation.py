@@ -4,6 +4,8 @@ A window is laid out by angle: one row per revolution, one column per angle. Per
 the linear trend over the revolutions are the synchronous part (synchronous averaging, with a trend
 for a cut that grows); the rest is asynchronous. Half-order lines of a tool with an odd number of
 teeth lie midway between spindle harmonics: there the averaging runs over two revolutions.
+
+Sums run through einsum, not BLAS: the same bits whatever the number of threads.
 """
 
 from __future__ import annotations
@@ -20,6 +22,9 @@ from scipy import fft, ndimage, signal
 
 from turnmill_core.monitoring.spectrum import Array, Spectrum
 
+LAYOUT = 2.5
+"""Samples of a layout per period of the highest judged frequency."""
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -31,23 +36,26 @@ class Prepared:
 
 
 def prepare(x: Array, rate: float, top: float) -> Prepared:
-    """Window resampled to at least four times its highest judged frequency (`top`, at most 0.45 rate)."""
+    """Window without what lies above its highest judged frequency, at four times that frequency or a little more.
+
+    top [Hz]: highest judged frequency, at most 0.45 rate. Four samples a period let cubic splines
+    interpolate; the low-pass (flat to `top`, 50 dB down from 1.5 top) lets the layout be coarser.
+    """
     top = min(top, 0.45 * rate)
-    x = x - x.mean()
-    if rate >= 8 * top:
-        down = int(rate / (4 * top))
-        return Prepared(signal.resample_poly(x, 1, down, window=_low_pass(1, down)), rate / down, top)
-    if rate < 4 * top:
-        up = math.ceil(4 * top / rate)
-        return Prepared(signal.resample_poly(x, up, 1, window=_low_pass(up, 1)), rate * up, top)
-    return Prepared(x, rate, top)
+    up, down = max(1, math.ceil(4 * top / rate)), max(1, int(rate / (4 * top)))
+    taps = _low_pass(top / (rate * up), up)
+    return Prepared(signal.resample_poly(x - x.mean(), up, down, window=taps), rate * up / down, top)
 
 
 @lru_cache(maxsize=16)
-def _low_pass(up: int, down: int) -> Array:
-    """Filter of a resampling: Kaiser window, 10 periods of the slower rate on either side."""
-    widest = max(up, down)
-    taps: Array = signal.firwin(20 * widest + 1, 1 / widest, window=("kaiser", 5.0)) if widest > 1 else np.ones(1)
+def _low_pass(edge: float, up: int) -> Array:
+    """Kaiser low-pass for a band edge in cycles per sample (at the raised rate): flat below, 50 dB down at 1.5 edge.
+
+    No band edge lies above 0.45 of the original rate, so the stop band begins at most at 0.55 of it.
+    """
+    stop = min(1.5 * edge, 0.55 / up)
+    count, beta = signal.kaiserord(50.0, 2 * (stop - edge))
+    taps: Array = signal.firwin(count | 1, edge + stop, window=("kaiser", beta))
     taps.flags.writeable = False
     return taps
 
@@ -91,7 +99,7 @@ def lay_out(p: Prepared, turns: Array, multiple: int) -> Layout:
     if revolutions < 3 * multiple:
         raise ValueError(f"window holds {total:.3g} revolutions, expected at least {3 * multiple}")
     frequency = total * p.rate / (len(turns) - 1)
-    points = fft.next_fast_len(math.ceil(p.rate / frequency), real=True)
+    points = fft.next_fast_len(math.ceil(LAYOUT * p.top / frequency), real=True)
     angle = turns[-1] - revolutions + (np.arange(revolutions * points) + 1) / points
     index = np.interp(angle, turns, np.arange(len(turns)))
     values = ndimage.map_coordinates(p.samples, index[None, :], order=3, mode="nearest")
@@ -128,7 +136,7 @@ def synchronous(layout: Layout, values: Array, period: int) -> Synchronous:
     table = values.reshape(layout.revolutions // period, period * layout.points)
     rows = (np.arange(len(table)) - (len(table) - 1) / 2) * period
     mean = table.mean(axis=0)
-    trend = (rows @ table) / (rows @ rows)
+    trend = np.einsum("i,ij->j", rows, table) / np.sum(rows**2)
     scale = 2 / (period * layout.points)
     return Synchronous(period, len(table), (mean + rows[:, None] * trend).ravel(),
                        fft.rfft(mean) * scale, fft.rfft(trend) * scale)
@@ -144,9 +152,9 @@ def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Ar
     wave = np.exp(2j * math.pi * np.outer(frequencies, layout.times))
     ramp = np.linspace(-1.0, 1.0, len(values))
     columns = np.concatenate([wave.real, wave.imag, wave.real * ramp, wave.imag * ramp])
-    gram = columns @ columns.T
+    gram = np.einsum("ik,jk->ij", columns, columns)
     gram[np.diag_indices(len(gram))] *= 1 + 1e-9
-    found: Array = np.linalg.solve(gram, columns @ values) @ columns
+    found: Array = np.einsum("i,ij->j", np.linalg.solve(gram, np.einsum("ik,k->i", columns, values)), columns)
     return found
 
 
@@ -154,7 +162,8 @@ def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Ar
 class Drift:
     """Departure of the tool's rotation from the assumed one, in turns from the window's middle.
 
-    True turns = turns (1 + speed) + ramp turns^2; speed: relative error of the speed; ramp: half its change per revolution.
+    True turns = turns (1 + speed) + ramp turns^2; speed: relative error of the speed; ramp: half its
+    change per revolution.
     """
 
     speed: float = 0.0
@@ -172,7 +181,8 @@ def drift(layout: Layout, values: Array, harmonics: NDArray[np.integer[Any]], no
     table = values.reshape(layout.revolutions, layout.points)
     r = np.arange(layout.revolutions) - (layout.revolutions - 1) / 2
     basis = np.stack([np.ones_like(r), r, r**2 - np.mean(r**2)])
-    fitted = fft.rfft((basis @ table) / np.sum(basis**2, axis=1)[:, None], axis=1)[:, harmonics] * (2 / layout.points)
+    fitted = fft.rfft(np.einsum("ij,jk->ik", basis / np.sum(basis**2, axis=1)[:, None], table))[:, harmonics]
+    fitted *= 2 / layout.points
     power = np.abs(fitted[0]) ** 2
     use = power > 20 * noise
     if not use.any():

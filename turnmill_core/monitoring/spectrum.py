@@ -50,20 +50,21 @@ class Line:
 
 
 @lru_cache(maxsize=32)
-def _hann(count: int) -> Array:
-    w = signal.windows.hann(count, sym=False)
+def _hann(count: int) -> tuple[Array, float]:
+    """Hann window and the sum of its squares."""
+    w = np.asarray(signal.windows.hann(count, sym=False), dtype=np.float64)
     w.flags.writeable = False
-    return np.asarray(w, dtype=np.float64)
+    return w, float(np.sum(w**2))
 
 
 def spectrum(x: Array, rate: float, top: float) -> Spectrum:
     """Power spectrum of `x` (samples at `rate` Hz, mean removed) from 0 to `top` [Hz]."""
-    w = _hann(len(x))
+    w, squares = _hann(len(x))
     count = fft.next_fast_len(PAD * len(x), real=True)
     step = rate / count
     keep = min(count // 2, int(top / step)) + 1
     amplitude = fft.rfft((x - x.mean()) * w, count)[:keep]
-    power = (amplitude.real**2 + amplitude.imag**2) * (2 / (count * (w @ w)))
+    power = (amplitude.real**2 + amplitude.imag**2) * (2 / (count * squares))
     return Spectrum(rate / count, power, noise_floor(power, max(8, round(40 * count / len(x)))))
 
 
