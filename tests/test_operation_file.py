@@ -7,6 +7,7 @@ import json
 import math
 import pickle
 from pathlib import Path
+from random import Random
 
 import pytest
 import yaml
@@ -154,7 +155,9 @@ BAD = [
     (("  teeth: 2", "  teeth: 2\n  teeth: 3"), "", ["line", "'teeth' stands twice"]),
     (("machine: Mori", "machine: *s # Mori"), "", ["aliases"]),
     (("machine: Mori", "machine: {a"), "", ["not valid YAML", "line"]),
-    (("machine: Mori", "machine: 2020-13-45 #"), "", ["not valid YAML"]),
+    (("machine: Mori", "machine: !!timestamp x #"), "", ["not valid YAML", "tag"]),
+    (("machine: Mori", "machine: !!bool x #"), "", ["not valid YAML", "tag"]),
+    (("machine: Mori", "machine: 0b_ #"), "", ["not valid YAML"]),
     (("machine: Mori", "machine: !!python/object/apply:os.system [ls] #"), "", ["not valid YAML"]),
     (("machine: Mori", "machine: \x07"), "", ["not valid YAML"]),
     (("machine: Mori", "machine: " + "[" * 5000), "", ["not valid YAML"]),
@@ -217,6 +220,27 @@ def test_a_schedule_has_two_points_or_none() -> None:
 @pytest.mark.parametrize("text", ["", "# only a comment\n", "5", "[]", "- a\n- b", "null", "a: 1\n---\nb: 2", "\x00"])
 def test_texts_that_are_no_mapping(text: str) -> None:
     assert problem(text).key == "" or "schema" in str(problem(text))
+
+
+def test_dates_are_texts() -> None:
+    assert parse_operation(edited(BAR, ("machine: Mori", "machine: 2020-13-45 #"))).machine == "2020-13-45"
+
+
+@given(st.randoms(use_true_random=False))
+def test_a_damaged_text_is_read_or_refused_in_one_line(random: Random) -> None:
+    text = random.choice([BAR + SCHEDULE, BLOCK + MILLING_SCHEDULE])
+    for _ in range(random.randint(1, 4)):
+        i, j = random.randrange(len(text)), random.randrange(len(text))
+        pieces = ["", "!!bool x", "*a", "&a", "{", "]", "- ", "\n", "1e999 mm", "\x85", "0b_", text[j : j + 30]]
+        piece = random.choice(pieces)
+        text = text[:i] + piece + text[i + random.randint(0, 12) :]
+    try:
+        error = ""
+        parse_operation(text, "cut.yaml")
+    except OperationError as caught:
+        error = str(caught)
+    assert len(error.splitlines()) <= 1
+    assert len(error) < 800
 
 
 def test_unreadable_files(tmp_path: Path) -> None:

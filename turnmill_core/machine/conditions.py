@@ -67,8 +67,9 @@ def with_cut(
     workpiece_speed: float | None = None,
     depth: float | None = None,
 ) -> Conditions:
-    """Nominal conditions with other speeds [rad/s] or depth [m]; the feed follows the spindles.
+    """Nominal conditions with other speeds or another depth; the feed follows the spindles.
 
+    tool_speed [rad/s], workpiece_speed [rad/s], depth [m]: None keeps the nominal value.
     The feed per workpiece revolution (turn-milling) or per tooth (milling) is kept. A workpiece that
     turns the other way keeps the direction of the axial feed, so up-milling becomes down-milling.
     Raises ValueError where the operation does not allow the value.
