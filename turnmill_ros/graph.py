@@ -34,7 +34,7 @@ from turnmill_ros import topics
 from turnmill_ros.errors import InputError
 from turnmill_ros.node_table import NodeSpec, with_matches
 from turnmill_ros.nodes import _support as support
-from turnmill_ros.nodes.graph_manager import GraphManager
+from turnmill_ros.nodes._graph_manager import GraphManager
 
 START_DEADLINE_S = 120.0
 INTERRUPT_DEADLINE_S = 2.5

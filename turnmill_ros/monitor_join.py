@@ -86,7 +86,7 @@ class MonitorFeed:
         self._given: deque[SpindleSpeed] = deque()
         self._newest: dict[str, int] = {"axes": -1, "recorded": -1}
         self._last_prior: Prior | None = None
-        self._recorded: deque[RecordedPrior] = deque(maxlen=1000)
+        self._recorded: dict[tuple[str, int, int], Prior | None] = {}
 
     def operation(self, stamp_ns: int, operation: Operation) -> Judged:
         """An operation that holds from `stamp_ns` on."""
@@ -122,8 +122,8 @@ class MonitorFeed:
         if self.settings.prior != "recorded":
             return ()
         self._newest["recorded"] = max(self._newest["recorded"], verdict.window_end_ns)
-        self._recorded.append(RecordedPrior(verdict.stream_id, verdict.last_sample, verdict.prior))
-        return self._give(self._recorded[-1]) + self._pump()
+        self._recorded[verdict.device, verdict.stream_id, verdict.last_sample] = verdict.prior
+        return self._pump()
 
     def finish(self) -> Judged:
         """The end of the stream: judge what waits with what is known."""
@@ -161,7 +161,7 @@ class MonitorFeed:
             self._held.popleft()
             self.judged += 1
             judged += self._give(block)
-            judged += self._go_without_prior()
+            judged += self._give_recorded()
         return tuple(judged)
 
     def _ready(self, block: SensorBlock, operation: Operation) -> bool:
@@ -179,7 +179,7 @@ class MonitorFeed:
     def _begin(self, operation: Operation) -> Judged:
         self._running, self._config = operation, self.settings.config(operation)
         self._state = initial(self._config)
-        known: list[object] = [*self._given, *self._recorded]
+        known: list[object] = [*self._given]
         if self._last_prior is not None:
             known.append(self._last_prior)
         return tuple(pair for item in known for pair in self._give(item))
@@ -207,14 +207,15 @@ class MonitorFeed:
             self._given.popleft()
         return tuple(judged)
 
-    def _go_without_prior(self) -> Judged:
-        """Windows that have no recorded verdict, though later ones have, are judged without a prediction."""
+    def _give_recorded(self) -> Judged:
+        """Give each window that is due the prior of its recorded verdict; none where it has no recorded verdict."""
         judged: list[tuple[Verdict, str]] = []
         while self.settings.prior == "recorded" and self._state is not None:
-            due = next(((s.stream_id, s.next_end) for s in self._state.streams if s.next_end <= s.end), None)
+            streams = self._state.streams
+            due = next(((s.device, s.stream_id, s.next_end - 1) for s in streams if s.next_end <= s.end), None)
             if due is None:
                 break
-            new = self._give(RecordedPrior(due[0], due[1] - 1, None))
+            new = self._give(RecordedPrior(due[1], due[2], self._recorded.pop(due, None)))
             if not new:
                 break
             judged += new

@@ -14,7 +14,7 @@ from turnmill_ros.errors import InputError
 from turnmill_ros.graph import GraphResult, run_graph
 from turnmill_ros.monitor_feed import open_feed, settings_for
 from turnmill_ros.node_table import live_specs, replay_specs
-from turnmill_ros.nodes.graph_manager import GraphManager
+from turnmill_ros.nodes._graph_manager import GraphManager
 
 OnVerdict = Callable[[Verdict], None]
 

@@ -127,6 +127,14 @@ def wait_until_acknowledged(node: Node, deadline_s: float = 1.0, until: threadin
     return not waiting
 
 
+def wait_until_alone(node: Node, deadline_s: float) -> None:
+    """Wait until nobody else publishes what `node` subscribes to, at most `deadline_s`."""
+    end, own = time.monotonic() + deadline_s, {p.topic_name for p in node.publishers}
+    while time.monotonic() < end and any(
+            s.get_publisher_count() > (s.topic_name in own) for s in node.subscriptions if hasattr(s, "handle_one")):
+        time.sleep(0.02)
+
+
 def wait_until_matched(node: Node, expected: Iterable[str]) -> None:
     """Wait until each "topic=count" of `expected` holds for the node's publisher or subscription of that name.
 

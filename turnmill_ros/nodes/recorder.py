@@ -29,6 +29,8 @@ class Recorder(LifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("recorder", **kwargs)
         self._bag = declare(self, "bag", "", "MCAP file to write; it must not exist")
+        self._linger = declare(self, "linger", 0.0, "s to go on recording at the end while other nodes still publish",
+                               low=0.0, high=60.0)
         self._match, _ = support.declare_common(self)
         self._counts: Counter[str] = Counter()
         self._waiting: list[tuple[Topic, bytes]] = []
@@ -53,6 +55,7 @@ class Recorder(LifecycleNode):
     @support.transition
     def on_deactivate(self, state: LifecycleState) -> None:
         """Write what has arrived and finish the file."""
+        support.wait_until_alone(self, self._linger)
         support.drain(self)
         self._attempt(self._finish)
         self.diagnostics.enter("closed", done=True)
