@@ -65,10 +65,12 @@ def at(op: Operation, **cut: float) -> Operation:
     return replace(op, conditions=with_cut(op, **cut))
 
 
-def exact_config(rate: int = 100_000, channels: tuple[str, ...] = ("tool_x", "tool_y"), **other: object) -> SimulationConfig:
+def exact_config(
+    rate: int = 100_000, channels: tuple[str, ...] = ("tool_x", "tool_y"), **other: object,
+) -> SimulationConfig:
     """Every integration step is a sample, and no noise."""
-    return SimulationConfig(sample_rate=rate, oversampling=1, channels=channels, displacement_noise=0.0, force_noise=0.0,
-                            sound=SILENT, **other)  # type: ignore[arg-type]
+    return SimulationConfig(sample_rate=rate, oversampling=1, channels=channels, displacement_noise=0.0,
+                            force_noise=0.0, sound=SILENT, **other)  # type: ignore[arg-type]
 
 
 def samples(chunks: Sequence[Chunk]) -> Floats:

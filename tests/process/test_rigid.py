@@ -17,7 +17,8 @@ FORCES = ("force_x", "force_y", "force_z")
 VERY_STIFF = tuple(Mode(20e3, 0.7, 1e6, mode.shape) for mode in STIFF)
 CASES = {
     "slot": milling(VERY_STIFF, material=EDGES, depth=1e-3),
-    "up-milling, helix": milling(VERY_STIFF, material=EDGES, depth=4e-3, span=(2e-3, 5e-3), helix_angle=math.radians(30)),
+    "up-milling, helix": milling(VERY_STIFF, material=EDGES, depth=4e-3, span=(2e-3, 5e-3),
+                                 helix_angle=math.radians(30)),
     "down-milling, 4 teeth": milling(VERY_STIFF, material=EDGES, depth=1e-3, span=(-5e-3, -2e-3), teeth=4),
     "turn-milling, up": turn_milling(VERY_STIFF, material=EDGES, depth=2e-3),
     "turn-milling, down, helix": turn_milling(VERY_STIFF, material=EDGES, depth=3e-3, sense="down", axial_feed=6e-3,
@@ -33,7 +34,8 @@ def last_turn(op: Operation, turns: int = 6, per_turn: int = 3600) -> np.ndarray
     """Forces (per_turn, 3) over the last of `turns` tool revolutions, from a multiple of a turn on."""
     period = 2 * math.pi / op.conditions.tool_speed
     rate = round(per_turn / period)
-    found = run(op, exact_config(rate, FORCES, block_duration=period, slices=96 if op.tool.helix_angle else 1), turns * period + 1e-6)
+    config = exact_config(rate, FORCES, block_duration=period, slices=96 if op.tool.helix_angle else 1)
+    found = run(op, config, turns * period + 1e-6)
     first = round((turns - 1) * period * rate)
     return found[first : first + round(period * rate)]
 
@@ -45,7 +47,8 @@ def test_forces_are_those_of_the_static_cut(name: str) -> None:
     found = last_turn(op)
     expected = revolution(op, op.conditions, angles=len(found), elements=128).force_tool
     peak = np.abs(expected).max()
-    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), atol=0.005 * np.abs(expected.mean(axis=0)).max())
+    mean = expected.mean(axis=0)
+    np.testing.assert_allclose(found.mean(axis=0), mean, atol=0.005 * np.abs(mean).max())
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.015 * peak
     np.testing.assert_allclose(np.abs(found).max(axis=0), np.abs(expected).max(axis=0), rtol=0.02)
 

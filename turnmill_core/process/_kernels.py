@@ -20,7 +20,8 @@ KNOT_COLUMNS = 10
 # SLIP: relative lengthening of the delay; FEED_X [m/s] at the tool tip and its SLOPE along the tool
 # axis [1/s]; START, EXIT [rad] of the arc across the feed, the end of the bar left out.
 # Columns of `modes`: exact transition of one oscillator over one step with a force linear in time.
-A11, A12, A21, A22, B1, C1, B2, C2, STIFFNESS, DAMPING, INVERSE_MASS, SHAPE_X, SHAPE_Y, SHAPE_Z, SIDE, RADIATION = range(16)
+A11, A12, A21, A22, B1, C1, B2, C2, STIFFNESS, DAMPING, INVERSE_MASS = range(11)
+SHAPE_X, SHAPE_Y, SHAPE_Z, SIDE, RADIATION = range(11, 16)
 MODE_COLUMNS = 16
 # SIDE: +1 on the tool, -1 on the workpiece, 0 radiates only (does not move the cutting point).
 # Columns of `raw`, one row per step.
@@ -64,7 +65,7 @@ def _left(rows: Floats, position: float, sin: float, cos: float) -> float:
     wc, wd = (1.0 + t) * t * (1.0 + s) / 2.0, -(1.0 + t) * t * s / 6.0
     x = wa * rows[a, 0] + wb * rows[b, 0] + wc * rows[c, 0] + wd * rows[d, 0]
     y = wa * rows[a, 1] + wb * rows[b, 1] + wc * rows[c, 1] + wd * rows[d, 1]
-    return x * sin + y * cos
+    return float(x * sin + y * cos)
 
 
 @njit(cache=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from turnmill_core.operation import require
 from turnmill_core.process.sensors import CHANNELS, SoundModel
@@ -30,7 +30,7 @@ class SimulationConfig:
     loss_of_contact: bool = True
     displacement_noise: float = 5e-8
     force_noise: float = 0.5
-    sound: SoundModel = SoundModel()
+    sound: SoundModel = field(default_factory=SoundModel)
     start_ns: int = 0
     device: str = "simulated"
     stream_id: int = 1

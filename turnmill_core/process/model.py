@@ -14,7 +14,7 @@ from turnmill_core.machine.conditions import conditions_from_axes, machine_from_
 from turnmill_core.operation import Conditions, Mode, Operation
 from turnmill_core.process import _kernels
 from turnmill_core.process.config import SimulationConfig
-from turnmill_core.process.sensors import CHANNELS, SoundModel, antialias_taps
+from turnmill_core.process.sensors import SoundModel, antialias_taps
 from turnmill_core.process.truth import principal_turns
 
 Floats = NDArray[np.float64]
@@ -28,10 +28,11 @@ MOST_SLICES = 32
 class ProcessModel:
     """Operation and configuration as the integrator wants them.
 
-    dt [s]; modes (M, 16) and the surface's cells see _kernels; tooth_angle, pitch [rad], runout [m]
-    (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), lag per height [rad/m]; coefficients (6,): Ktc, Krc,
-    Kac [Pa], and per height instead of edge length Kte, Kre, Kae [N/m]; taps: anti-alias filter; columns: of the raw signals, one per
-    channel; turns: tool revolutions in a principal period; uneven: the teeth are not equally spaced.
+    dt [s]; modes (M, 16): see _kernels; tooth_angle, pitch [rad], runout [m] (teeth,); shape (3,):
+    radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m]; coefficients (6,): Ktc,
+    Krc, Kac [Pa], and Kte, Kre, Kae per height instead of per edge length [N/m]; slices, cells of the
+    surface; taps: anti-alias filter; columns: of the raw signals, one per channel; teeth; turns: tool
+    revolutions in a principal period; uneven: the teeth are not equally spaced.
     """
 
     op: Operation
@@ -57,6 +58,7 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     dt = 1.0 / (config.sample_rate * config.ratio)
     pitch = np.array(tool.pitch)
     lag_per_depth = 2 * math.tan(tool.helix_angle) / tool.diameter
+    edge = np.array([material.Kte, material.Kre, material.Kae]) / math.cos(tool.helix_angle)
     depths = [op.conditions.depth, *(p.depth for p in op.schedule)]
     lag = abs(lag_per_depth) * max(0.0, *depths)
     speeds = [s for s in (op.conditions.tool_speed, *(p.tool_speed for p in op.schedule)) if s > 0]
@@ -65,8 +67,7 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
         runout=np.array(tool.runout or (0.0,) * tool.teeth),
         shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth]),
-        coefficients=np.array([material.Ktc, material.Krc, material.Kac, *(edge / math.cos(tool.helix_angle) for edge in (
-            material.Kte, material.Kre, material.Kae))]),
+        coefficients=np.array([material.Ktc, material.Krc, material.Kac, *edge]),
         slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
         taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),

@@ -61,7 +61,8 @@ class SoundModel:
     distance [m]; direction: cosines of the microphone's direction in the tool frame, through which the
     three components of acceleration are seen; tool_area, workpiece_area [m2]: radiating areas that
     move with the cutting point; panels: resonators with the mass [kg] and the shape through which
-    the cutting force drives them; panel_area [m2]; background [Pa rms] with its corner [Hz]; tones.
+    the cutting force drives them; panel_area [m2]; background [Pa rms], above background_corner [Hz]
+    falling with the frequency; tones.
     """
 
     distance: float = 0.5
@@ -113,7 +114,8 @@ def ambient_sound(
 ) -> tuple[Floats, float]:
     """Background noise and tones [Pa] for the samples from `first`, and the noise filter's last value.
 
-    tool_angle (n,) [rad] at the samples; last: what the call before returned (0 at the beginning).
+    first: index of the first sample; sample_rate [Hz]; tool_angle (n,) [rad] at the samples; last: what
+    the call before returned (0 at the beginning).
     """
     count = len(tool_angle)
     pole = math.exp(-2 * math.pi * model.background_corner / sample_rate)

@@ -91,8 +91,9 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
     half = len(model.taps) // 2
     return SimulationState(
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
-        force=np.zeros(3), scalars=np.zeros(_kernels.SCALARS), surface=surface, rows=np.zeros((half, len(_kernels.RAW))),
-        next_sample=0, samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
+        force=np.zeros(3), scalars=np.zeros(_kernels.SCALARS), surface=surface,
+        rows=np.zeros((half, len(_kernels.RAW))), next_sample=0,
+        samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
         marks=np.zeros((0, 4)), first_mark_skip=-1,
     )
 
@@ -114,7 +115,8 @@ def step(
     stamps = knots[:, _kernels.TIME]
     if np.any(np.diff(stamps) <= 0):
         at = int(np.argmax(np.diff(stamps) <= 0))
-        raise ValueError(f"axis state stamp is {stamps[at + 1]} s after one at {stamps[at]} s, expected ascending stamps")
+        raise ValueError(f"axis state stamp is {stamps[at + 1]} s since the start, after one at {stamps[at]} s, "
+                         "expected ascending stamps")
     if not len(state.knot):
         state = _begin(state, knots[0], base_ns)
     return _finish_chunk(config, *_integrate(config, state, knots), chunk)
@@ -200,7 +202,7 @@ def _finish_chunk(
     state = replace(state, marks=rest, first_mark_skip=state.first_mark_skip - skipped)
     state = _measure(config, state)
     size = config.block_samples
-    blocks = []
+    blocks: list[SensorBlock] = []
     samples = state.samples
     while len(samples) >= size:
         first = state.next_block + len(blocks) * size

@@ -31,7 +31,8 @@ Floats = NDArray[np.float64]
 MARKS_PER_TURN = 240
 PERIODS = 8
 CROSSING = 0.2
-FIELDS = ("time", "synchronous", "asynchronous", "half_order", "frequency", "in_cut", "touched")
+AMPLITUDES = ("time", "synchronous", "asynchronous", "half_order", "frequency")
+FIELDS = (*AMPLITUDES, "in_cut", "touched")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +40,8 @@ class Truth:
     """Noise-free amplitudes at the middle of successive windows, one principal period apart.
 
     time (n,) [s] since the first axis state; synchronous, asynchronous, half_order (n,) [m rms];
-    frequency (n,): strongest asynchronous line [Hz]; in_cut (n,): some chip is cut in every tool revolution of the window; touched (n,): some chip is
-    cut in the window.
+    frequency (n,): strongest asynchronous line [Hz]; in_cut (n,): some chip is cut in every tool
+    revolution of the window; touched (n,): some chip is cut in the window.
     """
 
     time: Floats
@@ -68,7 +69,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Moment [s] when the asynchronous amplitude passes a share of the synchronous one, and which way."""
+    """When the asynchronous amplitude passes a share of the synchronous one: time [s] and whether it is rising."""
 
     time: float
     rising: bool
@@ -90,7 +91,7 @@ def truth_of_marks(marks: Floats, teeth: int, turns: int, uneven: bool = False) 
     periods = len(marks) // length
     windows = max(0, periods - PERIODS + 1)
     half_order = teeth * turns // 2 if (teeth * turns) % 2 == 0 and not uneven else 0
-    values = np.zeros((windows, 5))
+    values = np.zeros((windows, len(AMPLITUDES)))
     in_cut = np.zeros(windows, dtype=np.bool_)
     touched = np.zeros(windows, dtype=np.bool_)
     for i in range(windows):
@@ -99,7 +100,8 @@ def truth_of_marks(marks: Floats, teeth: int, turns: int, uneven: bool = False) 
         chips = window[:, 3].reshape(-1, MARKS_PER_TURN).max(axis=1)
         in_cut[i] = bool(np.all(chips > 0))
         touched[i] = bool(np.any(chips > 0))
-    return Truth(*(values[:, c].copy() for c in range(5)), in_cut, touched), marks[windows * length :].copy()
+    truth = Truth(in_cut=in_cut, touched=touched, **{name: values[:, c].copy() for c, name in enumerate(AMPLITUDES)})
+    return truth, marks[windows * length :].copy()
 
 
 def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float, float]:

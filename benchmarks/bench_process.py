@@ -1,0 +1,102 @@
+"""Speed of the process simulator: simulated seconds per second on one core.
+
+    python benchmarks/bench_process.py [--json]
+
+Case: thesis Table 4.9, all direct modes, 2 teeth, helix, 1.2 mm, with sound and four displacements at
+51.2 kHz in blocks of 20 ms, and the demonstration with two channels at 12.8 kHz, from air into chatter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+
+import numpy as np
+
+from turnmill_core.machine.controller import axis_state_at
+from turnmill_core.operation import Operation
+from turnmill_core.operation_file import read_operation, shipped_operations
+from turnmill_core.process import _kernels
+from turnmill_core.process.scenarios import SCENARIOS
+from turnmill_core.process.simulation import SimulationConfig, initial, simulate, step
+
+FIVE = SimulationConfig(sample_rate=51200, channels=("sound", "tool_x", "tool_y", "workpiece_x", "workpiece_y"))
+
+
+def calibration() -> float:
+    """Time of sorting 200 000 fixed numbers [s], best of 10."""
+    values = np.random.default_rng(1).random(200_000)
+    times = []
+    for _ in range(10):
+        begin = time.perf_counter()
+        np.sort(values)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def real_time_factor(op: Operation, config: SimulationConfig, duration: float, runs: int = 3) -> float:
+    """Simulated seconds per second of processor time, best of `runs`, compiled before."""
+    list(simulate(op, config, 0, duration=0.1))
+    times = []
+    for _ in range(runs):
+        begin = time.process_time()
+        made = sum(len(chunk.blocks) for chunk in simulate(op, config, 0, duration=duration))
+        times.append(time.process_time() - begin)
+        assert made == int(duration / config.block_duration + 1e-6)
+    return duration / min(times)
+
+
+def kernel_share(op: Operation, config: SimulationConfig, duration: float) -> float:
+    """Share of the processor time of `step` that the integrator takes."""
+    spent = [0.0]
+    advance = _kernels.advance
+
+    def timed(*arguments: object) -> int:
+        begin = time.process_time()
+        written: int = advance(*arguments)
+        spent[0] += time.process_time() - begin
+        return written
+
+    per_block = round(config.axes_rate * config.block_duration)
+    axes = [axis_state_at(op, i / config.axes_rate, round(i * 1e9 / config.axes_rate))
+            for i in range(int(duration * config.axes_rate))]
+    state = initial(op, config, 0)
+    _kernels.advance = timed
+    begin = time.process_time()
+    for i in range(0, len(axes), per_block):
+        state, _ = step(config, state, axes[i : i + per_block])
+    total = time.process_time() - begin
+    _kernels.advance = advance
+    return spent[0] / total
+
+
+def measure() -> dict[str, float]:
+    """All figures: name with unit -> value."""
+    case = read_operation(shipped_operations()["thesis_table_4_9"])
+    demo = SCENARIOS["demo"]
+    drift = read_operation(next(p for p in shipped_operations().values() if p.name == demo.operation))
+    return {
+        "calibration_s": calibration(),
+        "table_4_9_5_channels_51200_hz_times_real_time": real_time_factor(case, FIVE, 4.0),
+        "table_4_9_5_channels_51200_hz_integrator_share": kernel_share(case, FIVE, 2.0),
+        "demo_2_channels_12800_hz_times_real_time": real_time_factor(drift, demo.config, demo.duration, 1),
+        "demo_5_channels_51200_hz_times_real_time": real_time_factor(drift, FIVE, demo.duration, 1),
+    }
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
+    arguments = parser.parse_args()
+    figures = measure()
+    if arguments.json:
+        print(json.dumps(figures))
+    else:
+        for name, value in figures.items():
+            print(f"{name:52s} {value:10.4g}")
+
+
+if __name__ == "__main__":
+    main()
