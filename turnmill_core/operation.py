@@ -279,7 +279,8 @@ class Operation:
 
     def __post_init__(self) -> None:
         if self.process == "turn-milling":
-            require(self.workpiece.is_bar, "workpiece", self.workpiece.name, "", "a bar (diameter, length) in turn-milling")
+            require(self.workpiece.is_bar, "workpiece", self.workpiece.name, "",
+                    "a bar (diameter, length) in turn-milling")
             _positive("axial feed", self.axial_feed, "m/rev")
         else:
             require(self.conditions.workpiece_speed == 0, "workpiece speed", self.conditions.workpiece_speed, "rad/s",
