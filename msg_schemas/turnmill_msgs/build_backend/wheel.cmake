@@ -1,11 +1,13 @@
-# Included at the end of project() for wheel builds only (see turnmill_msgs_build.py).
+# Included at the end of project() where ROS comes from pip: always for the wheel (turnmill_msgs_build.py), and for
+# colcon over a pip environment by -DCMAKE_PROJECT_INCLUDE=<this file>. A ROS installation does not need it.
 
-# Python modules go to site-packages, whatever ament_cmake_python would choose.
-set(PYTHON_INSTALL_DIR "${SKBUILD_PLATLIB_DIR}" CACHE PATH "site-packages of the wheel" FORCE)
-
-# Libraries lie in <prefix>/lib, extension modules in <prefix>/lib/pythonX.Y/site-packages/turnmill_msgs.
-set(CMAKE_INSTALL_RPATH "$ORIGIN:$ORIGIN/../../..")
-set(BUILD_TESTING OFF CACHE BOOL "" FORCE)
+if(SKBUILD)
+  # Python modules go to site-packages, whatever ament_cmake_python would choose.
+  set(PYTHON_INSTALL_DIR "${SKBUILD_PLATLIB_DIR}" CACHE PATH "site-packages of the wheel" FORCE)
+  # Libraries lie in <prefix>/lib, extension modules in <prefix>/lib/pythonX.Y/site-packages/turnmill_msgs.
+  set(CMAKE_INSTALL_RPATH "$ORIGIN:$ORIGIN/../../..")
+  set(BUILD_TESTING OFF CACHE BOOL "" FORCE)
+endif()
 
 # The ROS wheels' imported targets name include folders of the machine that built them.
 function(_turnmill_drop_missing_include_folders)
