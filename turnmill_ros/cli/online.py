@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,12 +17,18 @@ from turnmill_ros.cli.output import (
     console,
     new_file,
     print_json,
+    progress,
     quantity,
     table,
     whole,
 )
 from turnmill_ros.cli.recordings import BagArgument, show_analysis
 from turnmill_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+    from turnmill_ros.analysis import Analysis
+    from turnmill_ros.graph import GraphResult
 
 
 def register(app: typer.Typer) -> None:
@@ -104,7 +112,8 @@ def replay(
             new_file(path)
     with tempfile.TemporaryDirectory(prefix="turnmill-") as folder:
         out = output or Path(folder) / "replay.mcap"
-        result = run_replay(bag, operation, speed, out, separate_processes=separate)
+        with progress(f"replaying {bag.name}", quiet=as_json) as advance:
+            result = run_replay(bag, operation, speed, out, separate_processes=separate, progress=advance)
         analysis = analysis_of(out, result.verdicts)
         if report is not None:
             from turnmill_ros.predictions import read_predictions
@@ -148,11 +157,27 @@ def live(
             sample_rate=quantity(sample_rate, "Hz", "--sample-rate"),
             channels=whole(channels, "--channels", 1, 5),
             seed=whole(seed, "--seed", 0),
+            on_verdict=None if as_json else _tell_changes(),
         )
         _show_run(result, analysis_of(out, result.verdicts), output, None, as_json)
 
 
-def _show_run(result: Any, analysis: Any, output: Path | None, report: Path | None, as_json: bool) -> None:
+def _tell_changes() -> Callable[[Verdict], None]:
+    """A function that prints a line whenever the state of the cut changes."""
+    last: list[ChatterKind] = []
+
+    def tell(verdict: Verdict) -> None:
+        if last and last[0] is verdict.state:
+            return
+        last[:] = [verdict.state]
+        heard = f" at {verdict.chatter_frequency:.1f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
+        when = f"{datetime.fromtimestamp(verdict.window_end_ns * 1e-9):%H:%M:%S.%f}"[:-3]
+        console.print(f"{when} {verdict.state.name}{heard}: {verdict.reason_text}", soft_wrap=True)
+
+    return tell
+
+
+def _show_run(result: GraphResult, analysis: Analysis, output: Path | None, report: Path | None, as_json: bool) -> None:
     counts = {"sent": result.sent, "received": result.received, "judged": result.judged, "recorded": result.recorded}
     if as_json:
         from turnmill_ros.analysis import analysis_json
