@@ -25,12 +25,14 @@ class CompleteFile:
         self._held: list[bytes] | None = None
 
     def tell(self) -> int:
+        """Position [bytes] behind the last record, without the short end."""
         return self._end + sum(map(len, self._held or ()))
 
     def flush(self) -> None:
         """Nothing is buffered."""
 
     def write(self, data: bytes) -> int:
+        """Write whole records and the short end behind them; OSError leaves the file as it was before."""
         if self._held is not None:
             self._held.append(bytes(data))
         elif data:
@@ -63,6 +65,7 @@ class CompleteFile:
             raise
 
     def close(self) -> None:
+        """Bring the file to the disk and close it."""
         fd, self._fd = self._fd, -1
         if fd >= 0:
             try:

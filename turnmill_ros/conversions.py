@@ -67,7 +67,7 @@ def header_to_message(stamp_ns: int, types: Types, frame_id: str = "") -> Any:
 
 
 def scalar_to_message(value: float, types: Types) -> Any:
-    """std_msgs/Float64 for the plot topics."""
+    """std_msgs/Float64 of a value for the plot topics, in the unit that the topic table gives."""
     return _make(types, "std_msgs/msg/Float64", data=float(value))
 
 

@@ -43,7 +43,7 @@ def read_table(
     file: Path, time_column: str | None, columns: Sequence[str] | None, sample_rate: float | None, unit: str | None,
     quantity: str | None,
 ) -> Table:
-    """Read a table of samples; see importers.import_csv."""
+    """Read a table of samples; sample_rate [Hz] serves where there is no time column. See importers.import_csv."""
     header, rows = _read(file)
     names = [_split(name)[0] for name in header]
     time = _time_column(file, header, names, time_column)
