@@ -82,7 +82,13 @@ def test_truth_of_the_demo_tells_its_story():
     onset, rescue = (crossing["t_s"] for crossing in truth["crossings"])
     assert 2.5 < onset < rescue < time[-1]
     assert touched[(time > onset) & (time < rescue)].all()
-    assert truth["chatter_frequency_hz"] > 0
+    chatter = [f for f, t in zip(truth["frequency_hz"], time, strict=True) if onset + 0.5 < t < rescue - 0.5]
+    assert truth["chatter_frequency_hz"] == pytest.approx(np.median(chatter), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["flip_3_teeth", "flip_2_teeth", "runout_2_teeth", "air"])
+def test_truth_of_the_others_knows_no_lasting_asynchronous_vibration(name):
+    assert json.loads((BAGS / f"{name}.truth.json").read_text())["chatter_frequency_hz"] is None
 
 
 def test_gap_misses_what_it_says():

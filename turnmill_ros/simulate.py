@@ -29,6 +29,9 @@ CHANNELS = ("sound", "tool_x", "tool_y", "workpiece_x", "workpiece_y")
 START_NS = 1_735_689_600_000_000_000
 """Stamp of a simulated recording's first sample: 2025-01-01T00:00:00Z, so that the same input gives the same bytes."""
 
+LASTING_S = 0.5
+"""Shortest time above the 20 % line that counts as chatter in the truth [s]; entry and exit ring for less."""
+
 
 @dataclass(frozen=True)
 class Simulated:
@@ -129,12 +132,10 @@ class _InOrder:
 def truth_json(truth: Truth, op: Operation, config: SimulationConfig, seed: int) -> str:
     """Truth of a simulated cut as JSON: one value per window, amplitudes in m rms, times in s from the first sample.
 
-    frequency_hz: strongest asynchronous line in each window; chatter_frequency_hz: its median over the windows in
-    which the asynchronous amplitude is more than 20 % of the synchronous one, null without such; crossings: when it
-    passes that share.
+    frequency_hz: strongest asynchronous line in each window; chatter_frequency_hz: its median while the
+    asynchronous amplitude stays above 20 % of the synchronous one for half a second or longer, null where it never
+    does; crossings: when it passes that share.
     """
-    with np.errstate(invalid="ignore"):
-        chatter = truth.frequency[truth.ratio > CROSSING]
     record = {
         "operation": {"name": op.name, "sha256": op.sha256},
         "seed": seed,
@@ -146,10 +147,20 @@ def truth_json(truth: Truth, op: Operation, config: SimulationConfig, seed: int)
         "frequency_hz": _numbers(truth.frequency),
         "in_cut": truth.in_cut.tolist(),
         "touched": truth.touched.tolist(),
-        "chatter_frequency_hz": _numbers(np.array([np.median(chatter) if len(chatter) else np.nan]))[0],
+        "chatter_frequency_hz": _numbers(np.array([_chatter_frequency(truth)]))[0],
         "crossings": [{"t_s": float(f"{c.time:.6g}"), "rising": c.rising} for c in crossings(truth)],
     }
     return json.dumps(record, separators=(",", ":")).replace(',"', ',\n"') + "\n"
+
+
+def _chatter_frequency(truth: Truth) -> float:
+    """Median frequency [Hz] of lasting asynchronous vibration; NaN without any."""
+    with np.errstate(invalid="ignore"):
+        above = np.concatenate([[False], truth.ratio > CROSSING, [False]])
+    starts, stops = np.flatnonzero(~above[:-1] & above[1:]), np.flatnonzero(above[:-1] & ~above[1:])
+    lasting = [slice(a, b) for a, b in zip(starts, stops, strict=True)
+               if truth.time[b - 1] - truth.time[a] >= LASTING_S]
+    return float(np.median(np.concatenate([truth.frequency[run] for run in lasting]))) if lasting else float("nan")
 
 
 def _numbers(values: NDArray[np.float64]) -> list[float | None]:
