@@ -17,8 +17,9 @@ class SimulationConfig:
     integration steps per sample (0: enough for 100 kHz); block_duration [s]; axes_rate [Hz] of
     the axis states that `simulate` makes; slices along the tool axis (0: one per 0.02 rad of helix
     lag at the largest depth, at most 32); displacement_noise [m rms], force_noise [N rms], white;
-    loss_of_contact: the tool can leave the material (False: the linear cut, to compare with); sound: the
-    sound model; start_ns: stamp of the first sample; device, stream_id: of the blocks.
+    loss_of_contact: the tool can leave the material (False: the linear cut, to compare with); truth:
+    tell the truth (False: an empty one, which is faster); sound: the sound model; start_ns: stamp of
+    the first sample of `simulate`; device, stream_id: of the blocks.
     """
 
     sample_rate: int = 12800
@@ -28,6 +29,7 @@ class SimulationConfig:
     axes_rate: float = 250.0
     slices: int = 0
     loss_of_contact: bool = True
+    truth: bool = True
     displacement_noise: float = 5e-8
     force_noise: float = 0.5
     sound: SoundModel = field(default_factory=SoundModel)

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 SPINDLE = AXES.index("s")
 LAG_PER_SLICE = 0.02
 MOST_SLICES = 32
+TRUTH_HOP = 0.03  # s, about
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,8 @@ class ProcessModel:
     radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m]; coefficients (6,): Ktc,
     Krc, Kac [Pa], and Kte, Kre, Kae per height instead of per edge length [N/m]; slices, cells of the
     surface; taps: anti-alias filter; columns: of the raw signals, one per channel; teeth; turns: tool
-    revolutions in a principal period; uneven: the teeth are not equally spaced.
+    revolutions in a principal period; uneven: the teeth are not equally spaced; hop: principal periods
+    from one window of the truth to the next.
     """
 
     op: Operation
@@ -50,6 +52,7 @@ class ProcessModel:
     teeth: int
     turns: int
     uneven: bool
+    hop: int
 
 
 def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
@@ -73,6 +76,7 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),
         teeth=tool.teeth, turns=principal_turns(tool),
         uneven=bool(np.ptp(pitch) > 1e-9),
+        hop=max(1, round(TRUTH_HOP * op.conditions.tool_speed / (2 * math.pi * principal_turns(tool)))),
     )
 
 
@@ -128,6 +132,8 @@ def _crossing(wall: float, radius: float, lever: float, lead: float, epsilon: fl
         beyond = radius * (math.sqrt(1 + lead**2 / (lever**2 + x**2)) - 1)
         excess = y - lead * math.atan2(x, lever) - beyond - wall
         phi = math.acos(max(-1.0, min(1.0, math.cos(phi + epsilon) - excess / radius))) - epsilon
+        if abs(excess) < 1e-10 * radius:
+            break
     return phi
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,10 +104,17 @@ def antialias_taps(ratio: int) -> Floats:
 def white_noise(seed: int, channel: int, first: int, count: int) -> Floats:
     """Unit normal noise for samples first ... first + count - 1; the same for any cut into pieces."""
     frames = range(first // FRAME, (first + max(count, 1) - 1) // FRAME + 1)
-    drawn = [np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, channel, f)))).standard_normal(FRAME)
-             for f in frames]
     offset = first - frames[0] * FRAME
-    return np.concatenate(drawn)[offset : offset + count]
+    return np.concatenate([_frame(seed, channel, f) for f in frames])[offset : offset + count]
+
+
+@lru_cache(maxsize=64)
+def _frame(seed: int, channel: int, frame: int) -> Floats:
+    """FRAME values of unit normal noise, read-only."""
+    bits = np.random.Philox(np.random.SeedSequence((seed, channel, frame)))
+    values = np.random.Generator(bits).standard_normal(FRAME)
+    values.flags.writeable = False
+    return values
 
 
 def ambient_sound(

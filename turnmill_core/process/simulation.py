@@ -197,8 +197,9 @@ def _finish_chunk(
 ) -> tuple[SimulationState, Chunk]:
     """Measure, cut into blocks, and tell the truth."""
     skipped = min(state.first_mark_skip, len(marks))
-    truth, rest = truth_of_marks(np.concatenate([state.marks, marks[skipped:]]), state.model.teeth, state.model.turns,
-                                 state.model.uneven)
+    kept = np.concatenate([state.marks, marks[skipped:]]) if config.truth else state.marks
+    truth, rest = truth_of_marks(kept, state.model.teeth, state.model.turns, state.model.uneven,
+                                 state.model.hop)
     state = replace(state, marks=rest, first_mark_skip=state.first_mark_skip - skipped)
     state = _measure(config, state)
     size = config.block_samples

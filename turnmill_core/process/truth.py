@@ -37,7 +37,7 @@ FIELDS = (*AMPLITUDES, "in_cut", "touched")
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Noise-free amplitudes at the middle of successive windows, one principal period apart.
+    """Noise-free amplitudes at the middle of successive windows.
 
     time (n,) [s] since the first axis state; synchronous, asynchronous, half_order (n,) [m rms];
     frequency (n,): strongest asynchronous line [Hz]; in_cut (n,): some chip is cut in every tool
@@ -80,39 +80,42 @@ def principal_turns(tool: Tool) -> int:
     return 2 if tool.teeth % 2 and np.ptp(tool.pitch) < 1e-9 else 1
 
 
-def truth_of_marks(marks: Floats, teeth: int, turns: int, uneven: bool = False) -> tuple[Truth, Floats]:
+def truth_of_marks(
+    marks: Floats, teeth: int, turns: int, uneven: bool = False, hop: int = 1,
+) -> tuple[Truth, Floats]:
     """Amplitudes of every full window in `marks`, and the marks that later windows need.
 
     marks (n, 4): time [s], relative displacement x, y [m], largest chip [m] since the mark before,
     at equal angles, MARKS_PER_TURN to the revolution, beginning at a principal period. turns: tool
-    revolutions in a principal period; uneven: the teeth are not equally spaced.
+    revolutions in a principal period; uneven: the teeth are not equally spaced;
+    hop: principal periods from window to window.
     """
     length = MARKS_PER_TURN * turns
     periods = len(marks) // length
-    windows = max(0, periods - PERIODS + 1)
+    windows = max(0, (periods - PERIODS) // hop + 1)
     half_order = teeth * turns // 2 if (teeth * turns) % 2 == 0 and not uneven else 0
     values = np.zeros((windows, len(AMPLITUDES)))
     in_cut = np.zeros(windows, dtype=np.bool_)
     touched = np.zeros(windows, dtype=np.bool_)
     for i in range(windows):
-        window = marks[i * length : (i + PERIODS) * length]
+        window = marks[i * hop * length : (i * hop + PERIODS) * length]
         values[i] = _amplitudes(window, length, half_order)
         chips = window[:, 3].reshape(-1, MARKS_PER_TURN).max(axis=1)
         in_cut[i] = bool(np.all(chips > 0))
         touched[i] = bool(np.any(chips > 0))
     truth = Truth(in_cut=in_cut, touched=touched, **{name: values[:, c].copy() for c, name in enumerate(AMPLITUDES)})
-    return truth, marks[windows * length :].copy()
+    return truth, marks[windows * hop * length :].copy()
 
 
 def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float, float]:
     """Middle time, synchronous, asynchronous and half-order amplitude and chatter frequency of one window."""
-    values = window[:, 1:3].reshape(PERIODS, length, 2)
+    values = window[:, 1:3].reshape(PERIODS, 2 * length)
     step = np.arange(PERIODS) - (PERIODS - 1) / 2
     mean = values.mean(axis=0)
-    slope = np.tensordot(step, values, axes=(0, 0)) / np.sum(step**2)
-    residual = values - mean - step[:, None, None] * slope
+    residual = values - mean - step[:, None] * ((step @ values) / np.sum(step**2))
+    mean = mean.reshape(length, 2)
     synchronous = np.sqrt(np.sum(np.var(mean, axis=0)))
-    asynchronous = np.sqrt(np.sum(residual**2) / (length * PERIODS))
+    asynchronous = np.sqrt(np.vdot(residual, residual) / (length * PERIODS))
     half = 0.0
     if half_order:
         lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
@@ -126,11 +129,12 @@ def _strongest(values: Floats) -> float:
     """Frequency of the strongest line in `values` (n, 2), in cycles per sample, by a parabola through the peak."""
     if not np.any(values):
         return np.nan
-    power = np.sum(np.abs(np.fft.rfft(values * np.hanning(len(values))[:, None], 4 * len(values), axis=0)) ** 2, axis=1)
+    windowed = values * np.hanning(len(values))[:, None]
+    power = np.sum(np.abs(np.fft.rfft(windowed, 2 * len(values), axis=0)) ** 2, axis=1)
     peak = int(np.argmax(power[1:-1])) + 1
     left, top, right = np.log(power[peak - 1 : peak + 2] + np.finfo(float).tiny)
     curve = left - 2 * top + right
-    return float((peak + (0.5 * (left - right) / curve if curve < 0 else 0.0)) / (4 * len(values)))
+    return float((peak + (0.5 * (left - right) / curve if curve < 0 else 0.0)) / (2 * len(values)))
 
 
 def join_truth(parts: Iterable[Truth]) -> Truth:
