@@ -42,3 +42,12 @@ def test_no_chatter_in_the_stable_recording(recordings: Path, teeth: int) -> Non
 def test_no_chatter_while_idle(recordings: Path, teeth: int, rpm: float) -> None:
     verdicts = listen(recordings / "sound/idle.wav", teeth, rpm)
     assert not [v for v in verdicts if v.state in CHATTER]
+
+
+@pytest.mark.parametrize("rpm", [1628, 1684])
+def test_face_mill_chatter_with_a_nominal_speed_1_7_percent_off(recordings: Path, rpm: float) -> None:
+    verdicts = listen(recordings / "sound/chatter_1656rpm_6teeth.wav", 6, rpm)
+    in_cut = [v for v in verdicts if 2.0 < v.window_end_ns / 1e9 < 15.7]
+    hopf = [v for v in in_cut if v.state is ChatterKind.HOPF]
+    assert len(hopf) > 0.9 * len(in_cut)
+    assert np.median([v.tooth_passing_frequency for v in hopf]) == pytest.approx(165.6, rel=2e-3)

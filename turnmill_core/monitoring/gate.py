@@ -32,12 +32,20 @@ class Background:
         return float(self.power[max(0, k - 1): k + 2].sum())
 
 
-def learn(background: Background, f: Features, whole: Spectrum, share: float = 0.05) -> Background:
-    """Background moved by `share` (0 to 1) towards a window judged as air (its features and spectrum)."""
+def learn(config: ChatterConfig, background: Background, f: Features, whole: Spectrum) -> Background:
+    """Background moved towards a window judged as air (its features and spectrum).
+
+    By a twentieth; by a five-hundredth where the window is louder than the gate allows for air, so that a
+    coolant pump that starts is learned within half a minute, but a passing sound is not. A window
+    with a strong family (a tenth of the energy, with sidebands) is not learned: it may be chatter.
+    """
+    if f.chatter is not None and f.chatter.sidebands and f.chatter.energy > 0.1 * f.energy:
+        return background
     index = (np.arange(len(whole.power)) * (whole.step / STEP_HZ)).astype(int)
     binned = np.bincount(index, weights=whole.power).astype(np.float64)
     if background.power is None or len(background.power) != len(binned):
         return Background(f.energy, binned)
+    share = 0.05 if f.energy < config.gate_ratio**2 * background.energy else 0.002
     return Background((1 - share) * background.energy + share * f.energy,
                       (1 - share) * background.power + share * binned)
 

@@ -115,7 +115,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     held = persist(config, tracker.held, judgement.kind, plain_comb(f))
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
-        background = learn(background, f, whole)
+        background = learn(config, background, f, whole)
     verdict = _verdict(config, blank, f, judgement, held)
     return Tracker(held, background, scores, f.speed_ratio), verdict
 
