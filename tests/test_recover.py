@@ -87,12 +87,14 @@ def test_a_damaged_chunk_costs_only_itself_and_its_span_is_told(whole, tmp_path)
     assert bag_info(tmp_path / "out.mcap").metadata["recovery"]["damaged_chunks"] == "1"
 
 
-def test_lost_span_of_a_cut_chunk_is_told_exactly(whole, tmp_path):
+def test_the_time_from_which_messages_are_lost_is_told(whole, tmp_path):
     chunk = _chunks(whole)[2]
     (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[: chunk.chunk_start_offset + 500])
     done = recover(tmp_path / "cut.mcap", tmp_path / "out.mcap")
-    assert done.lost_spans_ns == ((chunk.message_start_time, chunk.message_end_time),)
+    assert done.lost_spans_ns == ((chunk.message_start_time, None),)
     assert done.lost_bytes == 500
+    since = (chunk.message_start_time - done.start_ns) * 1e-9
+    assert done.lost == f"messages from {since:.3f} s on; 500 bytes at the end"
 
 
 def test_recovered_file_keeps_metadata_schemas_and_quality_of_service(whole, tmp_path):

@@ -31,7 +31,7 @@ class Recovery:
     path: the new file; messages: saved, of all topics; start_ns, end_ns: their span (None without any);
     complete: nothing was lost; damaged_chunks: chunks inside the file that could not be read;
     lost_bytes: bytes from the place where the file could no longer be followed to its end; lost_spans_ns: log times
-    (first, last) of what was lost, as far as the file tells; last is None where it does not.
+    (first, last) of what was lost; last is None where the file breaks off, since nobody knows how much followed.
     """
 
     path: Path
@@ -83,7 +83,7 @@ def recover(path: str | Path, out: str | Path, *, overwrite: bool = False) -> Re
                 raise InputError("no message could be recovered", file=path)
             if rest is not None:
                 first = rest.first if rest.first is not None else salvage.end
-                salvage.lost.append((first or 0, rest.last))
+                salvage.lost.append((first or 0, None))
             lost_bytes = rest.lost_bytes if rest is not None else 0
             writer.add_metadata("recovery", {
                 "source": path.name, "messages": str(salvage.messages), "damaged_chunks": str(salvage.damaged),
@@ -95,11 +95,10 @@ def recover(path: str | Path, out: str | Path, *, overwrite: bool = False) -> Re
 
 @dataclass(frozen=True)
 class _Rest:
-    """The part of a file that could not be followed: bytes, and the log times of its chunk where known [ns]."""
+    """The part of a file that could not be followed: bytes, and its first log time [ns] where a chunk still tells it."""
 
     lost_bytes: int = 0
     first: int | None = None
-    last: int | None = None
 
 
 class _Salvage:
@@ -185,7 +184,7 @@ def _copy(stream: IO[bytes], size: int, salvage: _Salvage) -> _Rest | None:
             return None
         salvage.body(opcode, body)
     stream.seek(end)
-    head = stream.read(_HEAD.size + 16)
-    if len(head) == _HEAD.size + 16 and head[0] == Opcode.CHUNK:
-        return _Rest(size - end, *struct.unpack("<QQ", head[_HEAD.size:]))
+    head = stream.read(_HEAD.size + 8)
+    if len(head) == _HEAD.size + 8 and head[0] == Opcode.CHUNK:
+        return _Rest(size - end, int.from_bytes(head[_HEAD.size:], "little"))
     return _Rest(size - end)
