@@ -98,6 +98,8 @@ def _samples(seconds: float, rate: float) -> int:
 
 def _judge_ready(config: ChatterConfig, state: MonitorState, last: bool) -> tuple[MonitorState, tuple[Verdict, ...]]:
     """Judges every window that waits for nothing more; `last`: for nothing at all."""
+    if not any(s.next_end <= s.end for s in state.streams):
+        return state, ()
     verdicts: list[Verdict] = []
     kept: list[Stream] = []
     trackers = dict(state.trackers)

@@ -71,8 +71,8 @@ def spectrum(x: Array, rate: float, top: float) -> Spectrum:
 def noise_floor(power: Array, block: int) -> Array:
     """Mean noise power per bin: medians over blocks of bins, over ln 2, joined by straight lines."""
     blocks = max(1, len(power) // block)
-    medians = np.median(power[: blocks * block].reshape(blocks, -1), axis=1) if len(power) >= block \
-        else np.array([np.median(power)])
+    size = min(block, len(power))
+    medians = np.partition(power[: blocks * size].reshape(blocks, size), size // 2, axis=1)[:, size // 2]
     centres = (np.arange(len(medians)) + 0.5) * block
     floor: Array = np.interp(np.arange(len(power)), centres, medians) / np.log(2)
     return np.maximum(floor, np.finfo(float).tiny)

@@ -96,14 +96,14 @@ def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tup
 def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
                    prior: Prior | None) -> tuple[Tracker, Verdict]:
     p = prepare(x, rate, config.band[1])
-    turns = resampled_turns(turned.turns, len(p.samples), p.rate / rate)
     steady = turned.spread < 1e-5
-    whole = spectrum(p.samples, p.rate, p.top)
+    turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
+        turned.turns, len(p.samples), p.rate / rate)
     scores, ratio = tracker.scores, tracker.ratio
     band = (1 - config.axis_band, 1 + config.axis_band)
     if blank.spindle_speed_source is SpeedSource.NOMINAL:
         grid = ratio_grid(config.nominal_band)
-        new = _ratio_scores(config, whole, turned.mean / (2 * math.pi), grid)
+        new = _ratio_scores(config, spectrum(p.samples, p.rate, p.top), turned.mean / (2 * math.pi), grid)
         scores = new if scores is None else SCORE_MEMORY * scores + (1 - SCORE_MEMORY) * new
         ratio, _ = best_ratio(grid, scores)
         band = (ratio - 2e-3, ratio + 2e-3)
@@ -115,7 +115,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     held = persist(config, tracker.held, judgement.kind, plain_comb(f))
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
-        background = learn(config, background, f, whole)
+        background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
     verdict = _verdict(config, blank, f, judgement, held)
     return Tracker(held, background, scores, f.speed_ratio), verdict
 
