@@ -95,7 +95,7 @@ def recover(path: str | Path, out: str | Path, *, overwrite: bool = False) -> Re
 
 @dataclass(frozen=True)
 class _Rest:
-    """The part of a file that could not be followed: bytes, and its first log time [ns] where a chunk still tells it."""
+    """What could not be followed: bytes, and its first log time [ns] where a chunk still tells it."""
 
     lost_bytes: int = 0
     first: int | None = None
