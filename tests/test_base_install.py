@@ -10,17 +10,21 @@ from pathlib import Path
 
 import pytest
 
-# Runs as sitecustomize would: what comes with the extra `ros` or with turnmill_msgs cannot be found.
+# What comes with the extra `ros` or with turnmill_msgs cannot be found, as where it is not installed.
 WITHOUT_ROS = """
 import sys
 
-class NoRos:
+class WithoutRos:
+    def __init__(self, finder):
+        self.finder = finder
+
     def find_spec(self, name, path=None, target=None):
         top = name.split(".")[0]
-        if top in {"rclpy", "rosidl_parser", "ament_index_python"} or (top.endswith("_msgs") and "." not in name):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        if top in {"rclpy", "rosidl_parser", "ament_index_python"} or top.endswith("_msgs") and name == top:
+            return None
+        return self.finder.find_spec(name, path, target)
 
-sys.meta_path.insert(0, NoRos())
+sys.meta_path[:] = [WithoutRos(finder) for finder in sys.meta_path]
 """
 IMPORTS = """
 import turnmill_core, turnmill_ros.bag, turnmill_ros.analysis, turnmill_ros.report, turnmill_ros.cli
@@ -28,8 +32,8 @@ from turnmill_core.operation_file import read_operation, shipped_operations
 assert len(shipped_operations()) >= 9
 for path in shipped_operations().values():
     read_operation(path)
-from turnmill_ros.interfaces import definition
-assert "first_sample" in definition("turnmill_msgs/msg/SensorBlock")
+from turnmill_ros.interfaces import schema_text
+assert "first_sample" in schema_text("turnmill_msgs/msg/SensorBlock")
 """
 COMMAND = """
 from turnmill_ros.cli import main
