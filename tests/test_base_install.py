@@ -18,6 +18,9 @@ class WithoutRos:
     def __init__(self, finder):
         self.finder = finder
 
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
+
     def find_spec(self, name, path=None, target=None):
         top = name.split(".")[0]
         if top in {"rclpy", "rosidl_parser", "ament_index_python"} or top.endswith("_msgs") and name == top:
