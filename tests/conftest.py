@@ -27,6 +27,7 @@ _DOMAINS = _domains()
 os.environ["ROS_DOMAIN_ID"] = str(next(_DOMAINS))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ.pop("ROS_STATIC_PEERS", None)
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads that spin take the cores from the graph
 
 
 @pytest.fixture

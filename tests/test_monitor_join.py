@@ -36,8 +36,8 @@ def blocks(op: Operation, seconds: float = SECONDS) -> list[SensorBlock]:
     x = x + 0.4 * np.cos(2 * np.pi * tooth * 3.5 * t) + np.random.default_rng(1).normal(scale=0.01, size=len(t))
     x[: len(t) // 4] *= 0.01
     channel = (Channel("mic", "sound_pressure", "Pa"),)
-    return [SensorBlock(START + round(i * 1e9 / RATE), "daq", 1, i, RATE, channel, x[i: i + ROWS, None].astype(np.float32))
-            for i in range(0, len(t) - ROWS + 1, ROWS)]
+    return [SensorBlock(START + round(i * 1e9 / RATE), "daq", 1, i, RATE, channel,
+                        x[i: i + ROWS, None].astype(np.float32)) for i in range(0, len(t) - ROWS + 1, ROWS)]
 
 
 def axes(op: Operation, seconds: float = SECONDS) -> list[AxisState]:

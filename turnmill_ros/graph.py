@@ -24,6 +24,7 @@ import rclpy
 import yaml
 from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -73,9 +74,12 @@ class _Nodes:
         module = import_module(spec.kind.module)
         made = getattr(module, "".join(part.title() for part in spec.name.split("_")))
         options: dict[str, Any] = {} if spec.kind.role == "server" else {"enable_communication_interface": False}
-        return made(
-            context=context, use_global_arguments=False, start_parameter_services=spec.name == "controller",
-            parameter_overrides=[Parameter(key, value=value) for key, value in spec.parameters.items()], **options)
+        try:
+            return made(
+                context=context, use_global_arguments=False, start_parameter_services=spec.name == "controller",
+                parameter_overrides=[Parameter(key, value=value) for key, value in spec.parameters.items()], **options)
+        except (ParameterException, ValueError) as error:
+            raise InputError(f"{spec.name}: {error}") from error
 
     def change(self, names: Sequence[str], transition: str, deadline: float) -> list[str]:
         """Take nodes through a transition; returns those that refused."""
@@ -118,9 +122,7 @@ class _Processes:
         path = Path(self._folder.name) / f"{spec.name}.yaml"
         parameters = dict(spec.parameters) if spec.kind.role == "server" else {**spec.parameters, "autostart": False}
         path.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}), encoding="utf-8")
-        # Small matrices: threads of the linear algebra library would only take the processor from other nodes.
-        environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ,
-                       support.PARENT_VARIABLE: str(os.getpid())}
+        environment = {**os.environ, support.PARENT_VARIABLE: str(os.getpid())}
         return subprocess.Popen([sys.executable, "-m", spec.kind.module, "--ros-args", "--params-file", str(path)],
                                 env=environment, stdin=subprocess.DEVNULL, start_new_session=True)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -30,6 +30,7 @@ class Probe(Node):
         self.executor_.add_node(self)
         self.heard: dict[str, list[Any]] = {}
         self.out: dict[str, Any] = {}
+        self.diagnostics = SimpleNamespace(refuse=self.get_logger().warning)
         self.listen(topics.DIAGNOSTICS)
 
     def listen(self, topic: Topic, name: str | None = None) -> None:
@@ -72,7 +73,9 @@ class Probe(Node):
         return next((v.value for v in said[-1].values if v.key == key), None) if said else None
 
 
-def launch(module: str, folder: Path, limit: Callable[[], None] | None = None, **parameters: Any) -> subprocess.Popen[str]:
+def launch(
+    module: str, folder: Path, limit: Callable[[], None] | None = None, **parameters: Any,
+) -> subprocess.Popen[str]:
     """A node in a process of its own."""
     import yaml
 
@@ -80,4 +83,4 @@ def launch(module: str, folder: Path, limit: Callable[[], None] | None = None, *
     path.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}), encoding="utf-8")
     return subprocess.Popen(
         [sys.executable, "-m", f"turnmill_ros.nodes.{module}", "--ros-args", "--params-file", str(path)],
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}, stderr=subprocess.PIPE, text=True, preexec_fn=limit)
+        stderr=subprocess.PIPE, text=True, preexec_fn=limit)

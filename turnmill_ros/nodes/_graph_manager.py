@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -28,6 +29,7 @@ class GraphManager(Node):
     def __init__(self, on_verdict: Callable[[Verdict], None] | None = None, **kwargs: Any) -> None:
         super().__init__("graph_manager", **kwargs)
         self._on_verdict = on_verdict
+        self.diagnostics = SimpleNamespace(refuse=self.get_logger().warning)
         self.verdicts: list[Verdict] = []
         self.values: dict[str, dict[str, str]] = {}
         self.errors: dict[str, str] = {}

@@ -16,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
@@ -72,7 +73,10 @@ def subscription(
     """
     def handle(message: Any) -> None:
         if always or topic.latched or node.diagnostics.phase == ACTIVE:
-            callback(message)
+            try:
+                callback(message)
+            except ValueError as error:
+                node.diagnostics.refuse(f"a message on {topic.name} was refused: {error}")
 
     def handle_all(message: Any) -> None:
         handle(message)
@@ -170,14 +174,9 @@ def declare_common(node: Node) -> tuple[list[str], bool]:
     return [entry for entry in match if entry], bool(lossless)
 
 
-def accept_operation(node: Any, accept: Callable[[int, Operation], Any], message: Any) -> Any:
-    """Hand stamp and operation of a message to `accept`; one that is no operation is reported and left out."""
-    try:
-        return accept(time_from_message(message.header.stamp), operation_from_message(message))
-    except ValueError as error:
-        node.get_logger().error(f"operation refused: {error}")
-        node.diagnostics.refused = f"operation refused: {error}"
-        return None
+def accept_operation(accept: Callable[[int, Operation], Any], message: Any) -> Any:
+    """Hand stamp and operation of a message to `accept`. Raises ValueError where it is no operation."""
+    return accept(time_from_message(message.header.stamp), operation_from_message(message))
 
 
 def wait_for_operation(node: Any, operations: OperationTrack) -> Operation:
@@ -223,10 +222,16 @@ class Diagnostics:
         self._publisher = publisher(node, topics.DIAGNOSTICS)
         self._cpu = (time.process_time(), time.monotonic())
         self.failure: str | None = None
-        self.refused: str | None = None
+        self.refused, self._why = 0, ""
         self.done = False
         self.phase = "inactive"
         node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def refuse(self, why: str) -> None:
+        """Count a message that makes no sense, and say so in the next state."""
+        if not self.refused:
+            self._node.get_logger().warning(why)
+        self.refused, self._why = self.refused + 1, why
 
     def fail(self, message: str) -> None:
         """Say that the node cannot do its work; a process of its own then ends with exit code 1."""
@@ -243,9 +248,11 @@ class Diagnostics:
         cpu, now = time.process_time(), time.monotonic()
         share = (cpu - self._cpu[0]) / max(now - self._cpu[1], 1e-9)
         self._cpu = (cpu, now)
-        warning = None if self.failure else self.refused or self._warn()
+        warning = None if self.failure else self._why or self._warn()
         level = DiagnosticStatus.ERROR if self.failure else DiagnosticStatus.WARN if warning else DiagnosticStatus.OK
-        shown = {**self._values(), "phase": self.phase, "done": self.done, "cpu_share": f"{share:.3f}"}
+        self._why = ""
+        shown = {**self._values(), "refused_messages": self.refused, "phase": self.phase, "done": self.done,
+                 "cpu_share": f"{share:.3f}"}
         status = DiagnosticStatus(
             level=level, name=self._node.get_fully_qualified_name().strip("/"), hardware_id="turnmill",
             message=self.failure or warning or self.phase,
@@ -278,7 +285,8 @@ def stop(node: Node) -> None:
 def main(create: Callable[[], Any]) -> None:
     """Run one node until SIGINT, SIGTERM, its failure, or the end of the graph that started it.
 
-    A lifecycle node starts by itself where its parameter `autostart` is true. Exit code 1 after a failure.
+    A lifecycle node starts by itself where its parameter `autostart` is true. Exit code 1 after a failure, 2 for
+    parameters that it cannot be made with.
     """
     ending, node = threading.Event(), None
 
@@ -292,7 +300,11 @@ def main(create: Callable[[], Any]) -> None:
     parent = os.environ.get(PARENT_VARIABLE)
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
-    node = create()
+    try:
+        node = create()
+    except (ParameterException, InputError, ValueError) as error:
+        sys.stderr.write(f"{error}\n")
+        raise SystemExit(2) from None
     executor.add_node(node)
     try:
         if isinstance(node, LifecycleNode) and node.get_parameter("autostart").value:

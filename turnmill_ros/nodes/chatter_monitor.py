@@ -65,7 +65,7 @@ class ChatterMonitor(LifecycleNode):
 
     def on_operation(self, message: Any) -> None:
         """Judge another operation from its stamp on."""
-        self._publish(support.accept_operation(self, self._feed.operation, message) or ())
+        self._publish(support.accept_operation(self._feed.operation, message) or ())
 
     @support.transition
     def on_configure(self, state: LifecycleState) -> None:

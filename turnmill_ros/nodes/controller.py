@@ -29,22 +29,29 @@ class Overrides:
     depth_offset: float = 0.0
 
 
-def overridden(op: Operation, last: AxisState | None, before: AxisState, now: AxisState, by: Overrides) -> AxisState:
-    """Axis state under overrides, continuous in every spindle and feed axis.
+Offsets = tuple[float, ...]
+"""By how much overrides have moved each axis away from the schedule, in m and rad."""
 
-    last: the overridden state one step ago (None at the start); before, now: the scheduled states of that step
-    and this one. The feed follows its spindle: the workpiece's in turn-milling, the tool's in milling.
+
+def overridden(
+    op: Operation, offsets: Offsets, before: AxisState, now: AxisState, by: Overrides,
+) -> tuple[AxisState, Offsets]:
+    """Axis state under overrides, continuous in every spindle and feed axis, and the new offsets.
+
+    offsets: those of the step before, zeros at the start; before, now: the scheduled states of that step and this
+    one. The feed follows its spindle: the workpiece's in turn-milling, the tool's in milling.
     """
     turning = op.process == "turn-milling"
     feed, plunge = (2, 0) if turning else (0, 2)
     factors = [1.0] * 6
     factors[4], factors[5] = by.workpiece_speed, by.tool_speed
     factors[feed] = by.workpiece_speed if turning else by.tool_speed
-    start = before.position if last is None else last.position
-    position = [p + f * (b - a) for p, f, a, b in zip(start, factors, before.position, now.position, strict=True)]
-    position[plunge] = now.position[plunge] - by.depth_offset
-    velocity = [f * v for f, v in zip(factors, now.velocity, strict=True)]
-    return AxisState(now.stamp_ns, tuple(position), tuple(velocity))  # type: ignore[arg-type]
+    steps = zip(offsets, factors, before.position, now.position, strict=True)
+    moved = [offset + (factor - 1) * (end - start) for offset, factor, start, end in steps]
+    moved[plunge] = -by.depth_offset
+    position = tuple(p + m for p, m in zip(now.position, moved, strict=True))
+    velocity = tuple(f * v for f, v in zip(factors, now.velocity, strict=True))
+    return AxisState(now.stamp_ns, position, velocity), tuple(moved)  # type: ignore[arg-type]
 
 
 class Controller(LifecycleNode):
@@ -70,7 +77,7 @@ class Controller(LifecycleNode):
 
     def on_operation(self, message: Any) -> None:
         """Run another operation's schedule from its start."""
-        support.accept_operation(self, self._operations.add, message)
+        support.accept_operation(self._operations.add, message)
 
     @support.transition
     def on_configure(self, state: LifecycleState) -> None:
@@ -97,18 +104,19 @@ class Controller(LifecycleNode):
     def _run(self) -> None:
         operation, period = None, round(1e9 / self._rate)
         begun, stamp, end = time.monotonic_ns(), self.get_clock().now().nanoseconds, round(self._duration * 1e9)
-        tick, last = 0, None
+        tick, offsets = 0, (0.0,) * 6
         while not self._stopping.is_set():
             if operation is not self._operations.at(stamp + tick * period):
-                operation, first, last = self._operations.at(stamp + tick * period), tick, None
+                operation, first, offsets = self._operations.at(stamp + tick * period), tick, (0.0,) * 6
                 before = axis_state_at(operation, 0.0, stamp + tick * period)
                 self._running = operation.name
             if end and tick * period > end:
                 self.diagnostics.done = True
                 return
             now = axis_state_at(operation, (tick - first) * period * 1e-9, stamp + tick * period)
-            last, before = overridden(operation, last, before, now, self._overrides()), now
-            self._publisher.publish(axes_to_message(last, ros_types()))
+            state, offsets = overridden(operation, offsets, before, now, self._overrides())
+            before = now
+            self._publisher.publish(axes_to_message(state, ros_types()))
             self._sent, tick = self._sent + 1, tick + 1
             wait = (begun + tick * period - time.monotonic_ns()) * 1e-9
             self._late = max(self._late, -wait)

@@ -40,7 +40,7 @@ class ForcePredictor(LifecycleNode):
 
     def on_operation(self, message: Any) -> None:
         """Predict for another operation from its stamp on."""
-        support.accept_operation(self, self._operations.add, message)
+        support.accept_operation(self._operations.add, message)
 
     @support.transition
     def on_configure(self, state: LifecycleState) -> None:

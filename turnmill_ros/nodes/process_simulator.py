@@ -44,7 +44,7 @@ class ProcessSimulator(LifecycleNode):
 
     def on_operation(self, message: Any) -> None:
         """Cut something else from the operation's stamp on; the device then restarts."""
-        support.accept_operation(self, self._operations.add, message)
+        support.accept_operation(self._operations.add, message)
 
     @support.transition
     def on_configure(self, state: LifecycleState) -> None:
