@@ -94,25 +94,27 @@ def strobe(op: Operation, times: Sequence[float], kick: float, config: Simulatio
     return np.array(found)
 
 
-def multiplier(op: Operation, periods: int = 40, skip: int = 10, rate: int = 100_000) -> complex:
+def multiplier(op: Operation, periods: int = 60, rate: int = 100_000) -> complex:
     """Leading Floquet multiplier of one tooth period, from how a perturbation of the linear cut develops.
 
     The difference of two runs, one kicked, obeys a linear map; its leading eigenvalue is found by
-    dynamic mode decomposition of the energy-weighted modal states, four successive ones stacked.
+    dynamic mode decomposition of the energy-weighted modal states, four successive ones stacked; the leading one is what is left at the end.
     """
     config = exact_config(rate, loss_of_contact=False)
     period = 2 * math.pi / op.conditions.tool_speed / op.tool.teeth
-    times = [i * period for i in range(skip + periods + 1)]
+    times = [i * period for i in range(periods + 1)]
     difference = strobe(op, times, 1.0, config) - strobe(op, times, 0.0, config)
     modes = (*op.tool.structure.modes, *op.workpiece.structure.modes)
     difference *= np.sqrt([[mode.stiffness, mode.mass] for mode in modes])
     rows = difference.reshape(len(times), -1)
     size = np.linalg.norm(rows, axis=1)
-    rows = rows[: int(np.argmax(size < 1e-14 * size[0])) or len(rows)][skip:]
+    rows = rows[: int(np.argmax(size < 1e-13 * size[0])) or len(rows)]
+    rows = rows[len(rows) // 3 :]
     stacked = np.concatenate([rows[i : len(rows) - 4 + i] for i in range(4)], axis=1).T
     before, after = stacked[:, :-1], stacked[:, 1:]
     scale = np.linalg.norm(before, axis=0)
     left, values, right = np.linalg.svd(before / scale, full_matrices=False)
     keep = values > 1e-6 * values[0]
-    found = np.linalg.eigvals(left[:, keep].T @ (after / scale) @ right[keep].T / values[keep])
-    return complex(found[np.argmax(np.abs(found))])
+    values, vectors = np.linalg.eig(left[:, keep].T @ (after / scale) @ right[keep].T / values[keep])
+    share = np.linalg.solve(vectors, left[:, keep].T @ after[:, -1]) * np.linalg.norm(vectors, axis=0)
+    return complex(values[np.argmax(np.abs(share))])

@@ -103,3 +103,38 @@ def test_chatter_saturates_by_loss_of_contact_at_the_solvers_frequency() -> None
     result = period_map(problem, 160)
     family = [line.frequency for line in verdict_from_map(result.matrix, result.displacement, result.period).lines]
     assert min(abs(truth.frequency[-1] / f - 1) for f in family) < 0.005
+
+
+def random_cut(seed: int) -> Operation:
+    """A cut drawn from everything the simulator describes; depths around the limit."""
+    draw = np.random.default_rng(seed)
+    modes = tuple(
+        Mode(float(draw.uniform(300, 1500)), float(draw.uniform(0.01, 0.05)), float(draw.uniform(0.1, 1.0)), shape)
+        for shape in (X, Y, (0.6, 0.8, 0.0))[: int(draw.integers(1, 4))])
+    helix = float(draw.choice([0.0, 0.3, 0.6]))
+    teeth = int(draw.integers(1, 5))
+    depth = float(10 ** draw.uniform(-3.5, -2.3))
+    speed = float(draw.uniform(2500, 12000)) * RPM
+    if draw.random() < 0.5:
+        return turn_milling((), workpiece_speed=float(draw.choice([-1, 1]) * draw.uniform(1, 60)) * RPM, speed=speed,
+                            depth=depth, sense=str(draw.choice(["up", "down"])),
+                            axial_feed=float(draw.uniform(1e-3, 10e-3)), workpiece_modes=modes, teeth=teeth,
+                            helix_angle=helix)
+    span = [(-5e-3, 5e-3), (float(draw.uniform(0, 4e-3)), 5e-3), (-5e-3, -float(draw.uniform(0, 4e-3)))]
+    return milling(modes, teeth=teeth, speed=speed, depth=depth, span=span[int(draw.integers(3))], helix_angle=helix)
+
+
+@pytest.mark.slow
+def test_growth_at_seeded_points() -> None:
+    """ln|mu| within 1 % of the solver's wherever |mu| is more than 0.02 from 1 and does not vanish in a period."""
+    compared: list[float] = []
+    seed = 0
+    while len(compared) < 50:
+        op = random_cut(seed)
+        seed += 1
+        expected = leading(op, 160)
+        if abs(abs(expected) - 1) < 0.02 or abs(expected) < 0.3:
+            continue
+        compared.append(math.log(abs(multiplier(op))) / math.log(abs(expected)) - 1)
+        print(seed - 1, f"{abs(expected):.4f}", f"{compared[-1]:.2e}")
+    assert max(map(abs, compared)) < 0.01

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Columns of `knots`, one row per axis state.
-TIME, TOOL_ANGLE, TOOL_SPEED, SLIP, DEPTH, FEED_X, FEED_X_SLOPE, FEED_Y, START, EXIT = range(10)
-KNOT_COLUMNS = 10
-# SLIP: relative lengthening of the delay; FEED_X [m/s] at the tool tip and its SLOPE along the tool
-# axis [1/s]; START, EXIT [rad] of the arc across the feed, the end of the bar left out.
+TIME, TOOL_ANGLE, TOOL_SPEED, SLIP, DEPTH, FEED_X, FEED_X_SLOPE, FEED_Y, START, START_SLOPE, EXIT, EXIT_SLOPE = range(12)
+KNOT_COLUMNS = 12
+# SLIP: relative lengthening of the delay; START, EXIT [rad] of the arc across the feed, the end of the
+# bar left out; FEED_X [m/s], START and EXIT at the tool tip and their SLOPE along the tool axis.
 # Columns of `modes`: exact transition of one oscillator over one step with a force linear in time.
 A11, A12, A21, A22, B1, C1, B2, C2, STIFFNESS, DAMPING, INVERSE_MASS = range(11)
 SHAPE_X, SHAPE_Y, SHAPE_Z, SIDE, RADIATION = range(11, 16)
@@ -45,6 +45,26 @@ def _ramp(u: float) -> float:
     if u < 0.0:
         return 0.5 * (1.0 + u) * (1.0 + u)
     return 1.0 - 0.5 * (1.0 - u) * (1.0 - u)
+
+
+@njit(cache=True)
+def _ramp_integral(u: float) -> float:
+    """Integral of _ramp from minus infinity to u."""
+    if u <= -1.0:
+        return 0.0
+    if u >= 1.0:
+        return u
+    if u < 0.0:
+        return (1.0 + u) ** 3 / 6.0
+    return u + (1.0 - u) ** 3 / 6.0
+
+
+@njit(cache=True)
+def _past(u: float, length: float) -> float:
+    """Share of a slice, `length` steps long, that has passed an edge, averaged over a step; u: its middle."""
+    if length < 1e-3:
+        return _ramp(u)
+    return (_ramp_integral(u + 0.5 * length) - _ramp_integral(u - 0.5 * length)) / length
 
 
 @njit(cache=True)
@@ -85,20 +105,24 @@ def _cut(
     now: a row of knots at this instant; turned [rad]: tool angle of the step; psi [rad]: angle of the
     tool in the material. place (teeth, slices, 4) receives what _leave_surface needs: sine and
     cosine of the tooth's angle, middle height of the engaged part of the slice [m] (-1: no chip is
-    cut), and 1 near the cut, else 0. Entry and exit are averaged with a hat of one step's width,
-    which keeps impulse and moment of the force when an edge falls inside a step. contact: a chip is
+    cut), and 1 near the cut, else 0. Entry and exit of a slice are taken with its share that has passed,
+    averaged with a hat of one step's width, which keeps impulse and moment of the force when an edge
+    falls inside a step. contact: a chip is
     never negative; without it the force stays linear.
     """
-    teeth, slices, cells, _ = surface.shape
+    teeth, slices = surface.shape[0], surface.shape[1]
+    cells = surface.shape[2] // 2 if teeth == 1 else surface.shape[2]
     radius, bar_radius, lag_per_depth = shape
     cell = 2.0 * math.pi / cells
     depth = max(0.0, now[DEPTH])
     start, leave = now[START], now[EXIT]
     lag_step = lag_per_depth * depth / slices
     lag_all = (slices - 1) * lag_step
-    margin = 4.0 * max(cell, turned) + 1.5 * pitch.max() * now[SLIP]
+    margin = 0.5 * abs(lag_step) + 4.0 * max(cell, turned) + 1.5 * pitch.max() * now[SLIP]
+    margin += depth * max(abs(now[START_SLOPE]), abs(now[EXIT_SLOPE]))
     first = start - margin
     cos_step, sin_step = math.cos(lag_step), math.sin(lag_step)
+    length = abs(lag_step) / turned
     chip = 0.0
     force[:] = 0.0
     place[:, :, 3] = 0.0
@@ -117,20 +141,21 @@ def _cut(
             if phi < first or phi > leave + margin:
                 continue
             place[j, s, 0], place[j, s, 1], place[j, s, 2], place[j, s, 3] = sin, cos, -1.0, 1.0
-            weight = _ramp((phi - start) / turned) - _ramp((phi - leave) / turned)
-            if weight <= 0.0:
-                continue
             low, high = depth * s / slices, depth * (s + 1) / slices
             if bar_radius > 0.0:
                 reach = radius * sin
                 high = min(high, math.sqrt(max(0.0, bar_radius * bar_radius - reach * reach)) - bar_radius + depth)
-            width = weight * (high - low)
-            if width <= 0.0:
+            if high <= low:
                 continue
             height = 0.5 * (low + high)
+            enter, go = start + height * now[START_SLOPE], leave + height * now[EXIT_SLOPE]
+            width = (high - low) * (_past((phi - enter) / turned, length) - _past((phi - go) / turned, length))
+            if width <= 0.0:
+                continue
             place[j, s, 2] = height
             feed = (now[FEED_X] + now[FEED_X_SLOPE] * height) * sin + now[FEED_Y] * cos
-            left = _left(surface[ahead, s], (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell, sin, cos)
+            position = (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell
+            left = _left(surface[ahead, s], position - cells if teeth == 1 else position, sin, cos)
             h = runout[j] + px * sin + py * cos + feed * period - left
             if contact and h <= 0.0:
                 continue
@@ -151,7 +176,7 @@ def _leave_surface(
 ) -> None:
     """Store the surface that each tooth leaves at every node of material angle passed in the step.
 
-    surface (teeth, slices, cells, 2) [m]: where the edge was that cut it last, as displacement x, y of
+    surface (teeth, slices, cells of a turn, 2) [m], two turns for a tool with one tooth: where the edge was that cut it last, as displacement x, y of
     the tool against the material, moved on by the feed of every pass that missed it. A later pass sees
     it along its own normal, which is the chip n . (d(t) - d(t - tau)) of the linear theory.
     motion (2, 4): displacement x, y [m] and velocity x, y [m/s] at the beginning and the end of the
@@ -159,7 +184,8 @@ def _leave_surface(
     due, the surface is taken to be where the edge is, so that material that comes into the cut looks
     as if the tooth before had left it.
     """
-    teeth, slices, cells, _ = surface.shape
+    teeth, slices = surface.shape[0], surface.shape[1]
+    cells = surface.shape[2] // 2 if teeth == 1 else surface.shape[2]
     cell = 2.0 * math.pi / cells
     lag0 = lag_per_depth * depth0 / slices
     lag1 = lag_per_depth * max(0.0, now[DEPTH]) / slices
@@ -182,10 +208,11 @@ def _leave_surface(
                 cos = place[j, s, 1] * cos_back + place[j, s, 0] * sin_back
                 x = sin * runout[j] + _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
                 y = cos * runout[j] + _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
-                here = int(node) % cells
+                here = int(node) % surface.shape[2]
                 if contact and place[j, s, 2] >= 0.0:
-                    old_x = surface[ahead, s, here, 0] - (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * period
-                    old_y = surface[ahead, s, here, 1] - now[FEED_Y] * period
+                    before_it = int(node - cells) % surface.shape[2]  # a revolution ago (one tooth), or the same place
+                    old_x = surface[ahead, s, before_it, 0] - (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * period
+                    old_y = surface[ahead, s, before_it, 1] - now[FEED_Y] * period
                     if (old_x - x) * sin + (old_y - y) * cos > 0.0:
                         x, y = old_x, old_y
                 surface[j, s, here, 0], surface[j, s, here, 1] = x, y
@@ -212,11 +239,11 @@ def advance(
 ) -> int:
     """Integrate the cut over len(raw) steps of `dt`, from step index `first`; returns the marks written.
 
-    knots (K, 10): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
+    knots (K, 12): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
     (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m];
     coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m]; contact: the tool can leave the material.
     Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
-    surface (teeth, slices, cells, 2) [m]. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
+    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
     displacement x, y, and largest chip since the last mark, at every 2 pi / marks_per_turn of the
     tool angle.
     """

@@ -91,13 +91,15 @@ def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
     if conditions.tool_speed > 0:
         row[_kernels.SLIP] = abs(conditions.workpiece_speed) / conditions.tool_speed
     row[_kernels.DEPTH] = conditions.depth
-    row[_kernels.FEED_X], row[_kernels.FEED_Y], row[_kernels.FEED_X_SLOPE], row[_kernels.START], row[_kernels.EXIT] = (
-        _arc(op, conditions))
+    tip, top = _arc(op, conditions, 0.0), _arc(op, conditions, max(1e-6, conditions.depth))
+    slope = [(b - a) / max(1e-6, conditions.depth) for a, b in zip(tip, top, strict=True)]
+    row[_kernels.FEED_X], row[_kernels.FEED_Y], row[_kernels.START], row[_kernels.EXIT] = tip
+    row[_kernels.FEED_X_SLOPE], _, row[_kernels.START_SLOPE], row[_kernels.EXIT_SLOPE] = slope
     return row
 
 
-def _arc(op: Operation, conditions: Conditions) -> tuple[float, float, float, float, float]:
-    """Feed [m/s] along x_T and y_T and its slope along the tool axis [1/s], start and exit angle [rad].
+def _arc(op: Operation, conditions: Conditions, height: float) -> tuple[float, float, float, float]:
+    """Feed [m/s] along x_T and y_T, start and exit angle [rad] at `height` [m] above the tool tip.
 
     What cutting.feed and cutting.engagement say, without arrays (an axis state comes every few
     milliseconds), and as if the bar were wide: the kernel lets the cut end where the bar does.
@@ -106,20 +108,19 @@ def _arc(op: Operation, conditions: Conditions) -> tuple[float, float, float, fl
     lower, upper = conditions.cross_feed_span
     if op.process == "milling":
         start, leave = (math.acos(max(-1.0, min(1.0, y / radius))) for y in (upper, lower))
-        return conditions.feed_speed, 0.0, 0.0, start, leave
-    speed, lever = abs(conditions.workpiece_speed), conditions.effective_radius
+        return conditions.feed_speed, 0.0, start, leave
+    speed, lever = abs(conditions.workpiece_speed), conditions.effective_radius + height
     sense = 1.0 if lower + upper >= 0 else -1.0
     if sense < 0:
         lower, upper = -upper, -lower
     if speed == 0:
         lower, upper = -radius, radius
     epsilon = math.atan2(conditions.feed_speed, speed * lever)
-    middle = lever + max(0.0, conditions.depth) / 2
-    start, leave = (_crossing(y, radius, middle, conditions.feed_speed / speed if speed else 0.0, epsilon)
+    start, leave = (_crossing(y, radius, lever, conditions.feed_speed / speed if speed else 0.0, epsilon)
                     for y in (upper, lower))
     if sense < 0:
         start, leave = math.pi - leave, math.pi - start
-    return speed * lever, sense * conditions.feed_speed, speed, start, leave
+    return speed * lever, sense * conditions.feed_speed, start, leave
 
 
 def _crossing(wall: float, radius: float, lever: float, lead: float, epsilon: float) -> float:

@@ -87,7 +87,7 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
         require(np.shape(modal)[1:] == (2,) and np.shape(modal)[0] <= count, "modal state shape", np.shape(modal), "",
                 f"(at most {count}, 2)")
         start[: len(modal)] = modal
-    surface = np.zeros((op.tool.teeth, model.slices, model.cells, 2))
+    surface = np.zeros((model.teeth, model.slices, model.cells * (2 if model.teeth == 1 else 1), 2))
     half = len(model.taps) // 2
     return SimulationState(
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
