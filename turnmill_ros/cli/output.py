@@ -71,7 +71,8 @@ def print_json(value: Any, indent: int | None = 2) -> None:
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Print a table."""
-    shown = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    console.print(title, style="bold", soft_wrap=True, markup=False)
+    shown = Table(header_style="bold")
     for k, name in enumerate(columns):
         shown.add_column(name, justify="left" if k == 0 else "right")
     for row in rows:
