@@ -101,6 +101,9 @@ class _Nodes:
             if hasattr(node, "hurry"):
                 node.hurry()
 
+    def end(self, names: Sequence[str]) -> None:
+        """Nodes of this process end together, at `close`."""
+
     def close(self, deadline: float) -> None:
         """Destroy the nodes."""
         for node in self._nodes.values():
@@ -151,11 +154,14 @@ class _Processes:
     def hurry(self) -> None:
         """Computations that wait are let go of at the SIGINT of `close`."""
 
+    def end(self, names: Sequence[str]) -> None:
+        """Tell processes to end, by SIGINT; they do so while others are still at work."""
+        for name in names:
+            if self.processes[name].poll() is None:
+                self.processes[name].send_signal(signal.SIGINT)
+
     def close(self, deadline: float) -> None:
-        """End the processes: SIGINT, then SIGKILL at the deadline."""
-        for process in self.processes.values():
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
+        """Wait for the processes; SIGKILL at the deadline."""
         for process in self.processes.values():
             try:
                 process.wait(max(0.05, deadline - time.monotonic()))
@@ -274,14 +280,15 @@ class _Run:
 
     def _finish(self, deadline: float) -> None:
         """Stop in the order of the data; at the deadline, whatever is left."""
-        for names in (*([name] for name in self._of("source")), self._of("consumer")):
-            self._nodes.change(names, "deactivate", deadline - 1.0)
-            self._spin(0.0)
-        self._nodes.change(self._of("recorder"), "deactivate", deadline)
-        self._spin(0.1)
+        stages = (*([name] for name in self._of("source")), self._of("consumer"), self._of("recorder"))
+        for names in stages:
+            self._nodes.change(names, "deactivate", deadline - (0.0 if names == stages[-1] else 1.0))
+            support.drain(self._manager)
+            self._nodes.end(names)
+        self._nodes.end(self._of("server"))
         self._nodes.close(deadline + 0.5)
-        self._executor.remove_node(self._manager)
         support.drain(self._manager)
+        self._executor.remove_node(self._manager)
         self._manager.destroy_node()
         self._executor.shutdown(timeout_sec=0.5)
 

@@ -318,4 +318,5 @@ def main(create: Callable[[], Any]) -> None:
         executor.shutdown(timeout_sec=0.5)
         node.destroy_node()
         rclpy.try_shutdown()
-    raise SystemExit(1 if failure else 0)
+    sys.stderr.flush()
+    os._exit(1 if failure else 0)  # tearing down the compiled libraries takes longer than the stop of a graph may

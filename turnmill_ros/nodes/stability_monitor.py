@@ -24,7 +24,7 @@ from turnmill_core.stability.margin import (
     stability_margin,
     stability_point,
 )
-from turnmill_core.stability.margin import _limit as depth_limit
+from turnmill_core.stability.search import depth_limit
 from turnmill_ros import topics
 from turnmill_ros.conversions import axes_from_message, lobes_to_message, margin_to_message, scalar_to_message
 from turnmill_ros.interfaces import ros_types
