@@ -58,7 +58,7 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
         ]
     plots += _spectra(analysis, channel)
     text = _headline(analysis)
-    _write(output, f"turnmill: {analysis.path.name}", [
+    write_page(output, f"turnmill: {analysis.path.name}", [
         f"<h1>{escape(analysis.operation.name)}</h1>",
         f"<p class=note>{escape(str(analysis.path.name))}, recorded {iso_time(start)}, "
         f"judged channel {escape(channel or 'none')}</p>",
@@ -69,7 +69,7 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
 def forces_report(output: Path, op: Operation, cut: Conditions, loads: CuttingLoads) -> None:
     """Write the picture of forces and torque over one tool revolution."""
     plots = [("", p) for p in figures.forces(loads.angle, loads.force_tool, loads.tool_torque)]
-    _write(output, f"turnmill forces: {op.name}", [
+    write_page(output, f"turnmill forces: {op.name}", [
         f"<h1>{escape(op.name)}</h1>",
         f"<p class=note>tool {cut.tool_speed * RPM:g} rpm, workpiece {cut.workpiece_speed * RPM:g} rpm, "
         f"depth {cut.depth * 1e3:g} mm</p>",
@@ -95,7 +95,8 @@ def _state(kind: ChatterKind) -> str:
     return f'<span class=state style="background:{figures.STATE_COLOURS[kind]}">{kind.name}</span>'
 
 
-def _rows(rows: Sequence[Sequence[str]], header: Sequence[str]) -> str:
+def html_table(rows: Sequence[Sequence[str]], header: Sequence[str]) -> str:
+    """Table of cells that are HTML already."""
     head = "".join(f"<th>{h}</th>" for h in header)
     body = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
     return f"<table><tr>{head}</tr>{body}</table>"
@@ -107,7 +108,7 @@ def _timeline_table(analysis: Analysis) -> str:
         return (_state(s.state), f"{analysis.seconds(s.start_ns):.2f}", f"{analysis.seconds(s.end_ns):.2f}", frequency,
                 f"{s.confidence:.2f}")
 
-    return "<h2>Timeline</h2>" + _rows([row(s) for s in timeline(analysis.segments)],
+    return "<h2>Timeline</h2>" + html_table([row(s) for s in timeline(analysis.segments)],
                                        ("state", "from [s]", "to [s]", "chatter [Hz]", "confidence"))
 
 
@@ -117,7 +118,8 @@ def _summary_table(analysis: Analysis) -> str:
         (_state(ChatterKind[name]), f"{length:.2f}") for name, length in values["durations_s"].items() if length > 0
     ]
     counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in analysis.counts.items())
-    return "<h2>Time in each state</h2>" + _rows(rows, ("state", "time [s]")) + f"<p class=note>{escape(counts)}</p>"
+    return ("<h2>Time in each state</h2>" + html_table(rows, ("state", "time [s]"))
+            + f"<p class=note>{escape(counts)}</p>")
 
 
 def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
@@ -150,13 +152,14 @@ def _operation_tables(op: Operation) -> str:
     parts = [f"<h2>Operation</h2><p class=note>sha256 {op.sha256}</p>"]
     for section, rows in describe(op):
         parts.append(f"<h3>{escape(section)}</h3>"
-                     + _rows([(escape(k), escape(v)) for k, v in rows], ("quantity", "value")))
+                     + html_table([(escape(k), escape(v)) for k, v in rows], ("quantity", "value")))
     return "".join(parts)
 
 
-def _write(
+def write_page(
     output: Path, title: str, head: Sequence[str], plots: Sequence[tuple[str, Any]], tail: Sequence[str]
 ) -> None:
+    """Write a page of HTML: parts of the head, bokeh plots with their headings ("" for none), parts of the tail."""
     script, divs = components([p for _, p in plots]) if plots else ("", ())
     body = [*head]
     for (heading, _), div in zip(plots, divs, strict=True):
