@@ -98,7 +98,8 @@ def multiplier(op: Operation, periods: int = 60, rate: int = 100_000) -> complex
     """Leading Floquet multiplier of one tooth period, from how a perturbation of the linear cut develops.
 
     The difference of two runs, one kicked, obeys a linear map; its leading eigenvalue is found by
-    dynamic mode decomposition of the energy-weighted modal states, four successive ones stacked; the leading one is what is left at the end.
+    dynamic mode decomposition of the energy-weighted modal states, four successive ones stacked: the
+    largest of those that are left at the end.
     """
     config = exact_config(rate, loss_of_contact=False)
     period = 2 * math.pi / op.conditions.tool_speed / op.tool.teeth
@@ -116,5 +117,6 @@ def multiplier(op: Operation, periods: int = 60, rate: int = 100_000) -> complex
     left, values, right = np.linalg.svd(before / scale, full_matrices=False)
     keep = values > 1e-6 * values[0]
     values, vectors = np.linalg.eig(left[:, keep].T @ (after / scale) @ right[keep].T / values[keep])
-    share = np.linalg.solve(vectors, left[:, keep].T @ after[:, -1]) * np.linalg.norm(vectors, axis=0)
-    return complex(values[np.argmax(np.abs(share))])
+    share = np.abs(np.linalg.solve(vectors, left[:, keep].T @ after[:, -1])) * np.linalg.norm(vectors, axis=0)
+    left_over = values[share > 0.01 * share.max()]
+    return complex(left_over[np.argmax(np.abs(left_over))])

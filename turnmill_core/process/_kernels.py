@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Columns of `knots`, one row per axis state.
-TIME, TOOL_ANGLE, TOOL_SPEED, SLIP, DEPTH, FEED_X, FEED_X_SLOPE, FEED_Y, START, START_SLOPE, EXIT, EXIT_SLOPE = range(12)
+TIME, TOOL_ANGLE, TOOL_SPEED, SLIP, DEPTH, FEED_X, FEED_X_SLOPE, FEED_Y = range(8)
+START, START_SLOPE, EXIT, EXIT_SLOPE = range(8, 12)
 KNOT_COLUMNS = 12
 # SLIP: relative lengthening of the delay; START, EXIT [rad] of the arc across the feed, the end of the
 # bar left out; FEED_X [m/s], START and EXIT at the tool tip and their SLOPE along the tool axis.
@@ -176,9 +177,10 @@ def _leave_surface(
 ) -> None:
     """Store the surface that each tooth leaves at every node of material angle passed in the step.
 
-    surface (teeth, slices, cells of a turn, 2) [m], two turns for a tool with one tooth: where the edge was that cut it last, as displacement x, y of
-    the tool against the material, moved on by the feed of every pass that missed it. A later pass sees
-    it along its own normal, which is the chip n . (d(t) - d(t - tau)) of the linear theory.
+    surface (teeth, slices, cells of a turn, 2) [m], two turns for a tool with one tooth: where the edge
+    was that cut it last, as displacement x, y of the tool against the material, moved on by the feed
+    of every pass that missed it. A later pass sees it along its own normal, which is the chip
+    n . (d(t) - d(t - tau)) of the linear theory.
     motion (2, 4): displacement x, y [m] and velocity x, y [m/s] at the beginning and the end of the
     step; psi0, psi1 and depth0, now[DEPTH]: angle in the material and depth there. Where no chip is
     due, the surface is taken to be where the edge is, so that material that comes into the cut looks
@@ -210,9 +212,10 @@ def _leave_surface(
                 y = cos * runout[j] + _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 here = int(node) % surface.shape[2]
                 if contact and place[j, s, 2] >= 0.0:
-                    before_it = int(node - cells) % surface.shape[2]  # a revolution ago (one tooth), or the same place
-                    old_x = surface[ahead, s, before_it, 0] - (now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]) * period
-                    old_y = surface[ahead, s, before_it, 1] - now[FEED_Y] * period
+                    old = int(node - cells) % surface.shape[2]  # a revolution ago (one tooth), or the same place
+                    feed_x = now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]
+                    old_x = surface[ahead, s, old, 0] - feed_x * period
+                    old_y = surface[ahead, s, old, 1] - now[FEED_Y] * period
                     if (old_x - x) * sin + (old_y - y) * cos > 0.0:
                         x, y = old_x, old_y
                 surface[j, s, here, 0], surface[j, s, here, 1] = x, y
@@ -243,9 +246,9 @@ def advance(
     (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m];
     coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m]; contact: the tool can leave the material.
     Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
-    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 11), see RAW; marks (n, 4): time, relative
-    displacement x, y, and largest chip since the last mark, at every 2 pi / marks_per_turn of the
-    tool angle.
+    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 11), see RAW; marks
+    (n, 4): time, relative displacement x, y, and largest chip since the last mark, at every
+    2 pi / marks_per_turn of the tool angle.
     """
     mark_angle = 2.0 * math.pi / marks_per_turn
     now = np.empty(knots.shape[1])
