@@ -10,7 +10,8 @@ import pytest
 from turnmill_ros.cli import app
 from turnmill_ros.cli.app import run
 
-COMMANDS = ("doctor", "operation", "simulate", "import", "replay", "analyze", "live", "stability", "forces", "recover")
+COMMANDS = ("doctor", "operation", "simulate", "import", "replay", "analyze", "live", "stability", "forces", "recover",
+            "toolpath")
 
 
 def ask(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
