@@ -12,6 +12,8 @@ PYTHON ?= $(shell for p in python3 python3.12 python3.11 python; do \
 	&& echo $$p && break; done)
 RUN := .venv/bin/python
 ARGS ?=
+# Test processes; each has ROS domains of its own.
+WORKERS ?= 2
 # Many small matrices: one BLAS thread takes a quarter of the time of several.
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -22,7 +24,7 @@ demo: run-venv
 	$(RUN) -m turnmill_ros.demo $(ARGS)
 
 test: dev-venv
-	$(RUN) -m pytest $(ARGS)
+	$(RUN) -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 check: dev-venv
 	$(RUN) -m ruff check .

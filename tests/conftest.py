@@ -9,6 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# The same examples in every run, and no clock; `pytest --hypothesis-profile=search` looks for new ones.
+settings.register_profile("seeded", deadline=None, derandomize=True, database=None)
+settings.register_profile("search", deadline=None, print_blob=True)
+settings.load_profile("seeded")
 
 DOMAINS = 102  # ROS_DOMAIN_ID 0 to 101: ports below the ephemeral range on every platform
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
