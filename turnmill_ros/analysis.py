@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ import numpy as np
 from turnmill_core.monitoring.chatter import ChatterConfig
 from turnmill_core.monitoring.verdict import ChatterKind, Verdict
 from turnmill_core.operation import Operation
+from turnmill_ros.bag import Finding, check_bag
+from turnmill_ros.errors import InputError
 from turnmill_ros.monitor_feed import open_feed
 
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP)
@@ -23,8 +26,8 @@ CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP)
 class Segment:
     """Consecutive verdicts with the same state: from the end of its first window to the end of the next state's first.
 
-    A verdict stands from its window's last sample, when it could be given, until the next one; the
-    first segment starts with the recording.
+    A verdict stands from its window's last sample, when it could be given, until the next one, but not
+    across a hole in the recording; the first segment starts with the recording.
     """
 
     start_ns: int
@@ -47,10 +50,21 @@ class Analysis:
     verdicts: tuple[Verdict, ...]
     segments: tuple[Segment, ...]
     counts: dict[str, int]
+    findings: tuple[Finding, ...] = ()
 
     def seconds(self, stamp_ns: int) -> float:
         """Time since the start of the recording [s]."""
         return (stamp_ns - self.start_ns) * 1e-9
+
+
+def trusted(path: Path) -> tuple[Finding, ...]:
+    """Warnings and notes on a recording; raises InputError at the first error, which leaves no verdict to trust."""
+    findings = check_bag(path)
+    for finding in findings:
+        if finding.severity == "error":
+            when = "" if finding.time_s is None else f" at {finding.time_s:.3f} s"
+            raise InputError(f"{finding.text}{when}", file=path, key=finding.topic or None)
+    return tuple(findings)
 
 
 def analyze(
@@ -61,13 +75,14 @@ def analyze(
     Raises InputError for a bag that cannot be trusted, naming file and reason.
     """
     feed = open_feed(path, operation)
+    findings = trusted(path)
     verdicts: list[Verdict] = []
     for new, share in feed.verdicts():
         verdicts.extend(new)
         if progress is not None:
             progress(share)
     return Analysis(path, feed.operation, feed.config, feed.start_ns, feed.end_ns, tuple(verdicts), merge(verdicts),
-                    feed.counts)
+                    feed.counts, findings)
 
 
 def analysis_of(path: Path, verdicts: Sequence[Verdict]) -> Analysis:
@@ -87,10 +102,14 @@ def merge(verdicts: Iterable[Verdict]) -> tuple[Segment, ...]:
             groups[-1].append(verdict)
         else:
             groups.append([verdict])
+    ends = [v.window_end_ns for group in groups for v in group]
+    hole = 2 * min((b - a for a, b in pairwise(ends) if b > a), default=0)
     segments = []
     for k, group in enumerate(groups):
         start = group[0].window_end_ns if k else group[0].window_start_ns
-        end = groups[k + 1][0].window_end_ns if k + 1 < len(groups) else group[-1].window_end_ns
+        end = group[-1].window_end_ns
+        if k + 1 < len(groups) and groups[k + 1][0].window_end_ns - end <= hole:
+            end = groups[k + 1][0].window_end_ns
         heard = [v.chatter_frequency for v in group if math.isfinite(v.chatter_frequency)]
         segments.append(Segment(start, end, group[0].state,
                                 float(np.median(heard)) if heard else math.nan,
@@ -163,6 +182,11 @@ def analysis_json(analysis: Analysis) -> dict[str, Any]:
         "bag": str(analysis.path),
         "start_time": iso_time(analysis.start_ns),
         "operation": {"name": analysis.operation.name, "sha256": analysis.operation.sha256},
+        "findings": [
+            {"severity": f.severity, "code": f.code, "topic": f.topic, "text": f.text, "t_s": f.time_s,
+             "count": f.count}
+            for f in analysis.findings
+        ],
         "verdicts": [verdict_json(v, analysis.start_ns) for v in analysis.verdicts],
         "segments": [
             {"t_start_s": analysis.seconds(s.start_ns), "t_end_s": analysis.seconds(s.end_ns), "state": s.state.name,

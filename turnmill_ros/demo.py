@@ -56,8 +56,10 @@ def changes(analysis: Analysis, truth: dict[str, Any]) -> list[Change]:
         next(c["t_s"] for c in truth["crossings"] if c["rising"]),
         next(c["t_s"] for c in truth["crossings"] if not c["rising"]),
     ]
+    air, _, hopf = seen[:3]
     names = ("enters the cut", "chatter begins", "chatter is gone")
-    return [Change(n, t, analysis.seconds(s.start_ns)) for n, t, s in zip(names, moments, seen[1:], strict=False)]
+    told = (air.end_ns, hopf.start_ns, hopf.end_ns)
+    return [Change(n, t, analysis.seconds(v)) for n, t, v in zip(names, moments, told, strict=True)]
 
 
 def run(bag: Path, folder: Path) -> None:

@@ -99,7 +99,7 @@ def replay(
     import tempfile
 
     _need_ros()
-    from turnmill_ros.analysis import analysis_of
+    from turnmill_ros.analysis import analysis_of, trusted
     from turnmill_ros.operations import find_operation
     from turnmill_ros.replay import replay as run_replay
 
@@ -110,6 +110,7 @@ def replay(
     for path in (output, report):
         if path is not None:
             new_file(path)
+    trusted(bag)
     with tempfile.TemporaryDirectory(prefix="turnmill-") as folder:
         out = output or Path(folder) / "replay.mcap"
         with progress(f"replaying {bag.name}", quiet=as_json) as advance:

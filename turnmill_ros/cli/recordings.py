@@ -163,7 +163,13 @@ def analyze_bags(
 def show_analysis(analysis: Analysis) -> None:
     """Print timeline and summary of one analysed recording."""
     from turnmill_ros.analysis import summary, timeline
+    from turnmill_ros.bag_check import describe
 
+    for finding in analysis.findings:
+        console.print(describe(finding), soft_wrap=True, markup=False)
+    if not analysis.verdicts:
+        console.print(f"{analysis.path}: shorter than one window, no verdict", soft_wrap=True, markup=False)
+        return
     rows = []
     for s in timeline(analysis.segments):
         frequency = f"{s.chatter_frequency:.1f}" if math.isfinite(s.chatter_frequency) else ""
