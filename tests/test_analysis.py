@@ -76,25 +76,16 @@ def test_iso_time_keeps_nanoseconds() -> None:
     assert iso_time(1_700_000_000_000_000_001) == "2023-11-14T22:13:20.000000001Z"
 
 
-def recordings_folder() -> Path:
-    import os
-
-    folder = os.environ.get("TURNMILL_RECORDINGS")
-    if not folder:
-        pytest.skip("TURNMILL_RECORDINGS is not set: recordings of real machines are not part of the project")
-    return Path(folder)
-
-
 @pytest.mark.parametrize(("name", "speed", "chatter"), [
     ("chatter_1656rpm_6teeth", "1656 rpm", True), ("idle", "1656 rpm", False), ("stable_5955rpm", "5955 rpm", False),
 ])
-def test_real_sound(name: str, speed: str, chatter: bool, tmp_path: Path) -> None:
+def test_real_sound(name: str, speed: str, chatter: bool, tmp_path: Path, recordings: Path) -> None:
     from turnmill_ros.importers import import_sound
     from turnmill_ros.operations import find_operation
 
     bag = tmp_path / "cut.mcap"
     operation = find_operation("face_mill_6_teeth", [f"cut.tool_speed={speed}"])
-    import_sound(recordings_folder() / "sound" / f"{name}.wav", operation, bag)
+    import_sound(recordings / "sound" / f"{name}.wav", operation, bag)
     found = summary(analyze(bag))
     if chatter:
         assert found["chatter_share_of_cut"] > 0.9
