@@ -118,5 +118,5 @@ def multiplier(op: Operation, periods: int = 60, rate: int = 100_000) -> complex
     keep = values > 1e-6 * values[0]
     values, vectors = np.linalg.eig(left[:, keep].T @ (after / scale) @ right[keep].T / values[keep])
     share = np.abs(np.linalg.solve(vectors, left[:, keep].T @ after[:, -1])) * np.linalg.norm(vectors, axis=0)
-    left_over = values[share > 0.01 * share.max()]
+    left_over = values[share > 0.1 * share.max()]
     return complex(left_over[np.argmax(np.abs(left_over))])
