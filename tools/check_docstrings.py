@@ -94,7 +94,7 @@ class Checker:
 
     def run(self) -> list[str]:
         """Check the module; returns the findings."""
-        if self.path.stem.startswith("_") and self.path.stem != "__init__":
+        if any(p.startswith("_") and p != "__init__.py" for p in self.path.parts):
             return []
         if self.tree.body and not ast.get_docstring(self.tree):
             self.say(1, "the module has no docstring")
