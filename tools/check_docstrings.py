@@ -94,8 +94,6 @@ class Checker:
 
     def run(self) -> list[str]:
         """Check the module; returns the findings."""
-        if any(p.startswith("_") and p != "__init__.py" for p in self.path.parts):
-            return []
         if self.tree.body and not ast.get_docstring(self.tree):
             self.say(1, "the module has no docstring")
         for node in self.tree.body:
@@ -152,9 +150,11 @@ class Checker:
 
 
 def sources(roots: list[str]) -> Iterator[Path]:
-    """Python files below the roots."""
+    """Public Python files below the roots."""
     for root in roots:
-        yield from sorted(Path(root).rglob("*.py"))
+        for path in sorted(Path(root).rglob("*.py")):
+            if not any(part.startswith("_") for part in path.relative_to(root).parts if part != "__init__.py"):
+                yield path
 
 
 def main() -> None:
