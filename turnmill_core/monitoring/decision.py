@@ -20,7 +20,10 @@ CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
 @dataclass(frozen=True)
 class Judgement:
-    """State of one window by itself, and what it rests on."""
+    """State of one window by itself, and what it rests on.
+
+    asynchronous_ratio, half_order_ratio [1], NaN where not computed; confidence, 0 to 1.
+    """
 
     kind: ChatterKind
     reason: Reason

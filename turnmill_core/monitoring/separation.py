@@ -36,7 +36,7 @@ class Prepared:
 
 
 def prepare(x: Array, rate: float, top: float) -> Prepared:
-    """Window without what lies above its highest judged frequency, at four times that frequency or a little more.
+    """Window `x` without what lies above its highest judged frequency, at four times that frequency or a little more.
 
     top [Hz]: highest judged frequency, at most 0.45 rate. Four samples a period let cubic splines
     interpolate; the low-pass (flat to `top`, 50 dB down from 1.5 top) lets the layout be coarser.
@@ -171,7 +171,7 @@ class Drift:
 
 
 def drift(layout: Layout, values: Array, harmonics: NDArray[np.integer[Any]], noise: Array) -> Drift:
-    """Drift seen in the phases of the harmonics (multiples of the spindle frequency).
+    """Drift of `values` seen in the phases of the harmonics (multiples of the spindle frequency).
 
     A wrong speed turns the phase of harmonic h by 2 pi h error each revolution, a wrong ramp bends
     it. Per harmonic from least squares over the revolutions (mean, trend, bend), then weighted
@@ -217,7 +217,10 @@ def uniform_in_time(layout: Layout, values: Array, rate: float) -> tuple[Array, 
 
 
 def harmonic_noise(floor: Spectrum, count: int, frequency: float, period: int, duration: float) -> Array:
-    """Mean square that broadband noise gives to each fitted harmonic (mean and trend), from a noise floor."""
+    """Mean square that broadband noise gives to each fitted harmonic (mean and trend), from a noise floor.
+
+    count: number of harmonics, multiples of frequency / period [Hz]; duration [s] of the window.
+    """
     at = np.arange(count) * frequency / period
     density = np.interp(at, floor.frequency, floor.floor / floor.step, right=0.0)
     noise: Array = 1.5 * density / duration

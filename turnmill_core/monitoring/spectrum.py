@@ -42,7 +42,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Line:
-    """A narrow peak: frequency [Hz], mean square of its sinusoid above the floor, power over floor [1]."""
+    """A narrow peak: frequency [Hz]; energy, mean square of its sinusoid above the floor; ratio [1], power / floor."""
 
     frequency: float
     energy: float

@@ -63,7 +63,7 @@ def constant_rotation(speed: float, count: int, rate: float) -> Rotation:
 
 def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: int, rate: float,
              longest_gap_ns: int) -> Rotation | None:
-    """Rotation over the window whose first and last samples have stamps start_ns and end_ns.
+    """Rotation over the window of `count` samples at `rate` [Hz] whose first and last have stamps start_ns and end_ns.
 
     The speed is linear between the held values, its integral exact; None where they do not cover
     the window or lie further apart than `longest_gap_ns`.
@@ -97,7 +97,7 @@ def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: 
 
 
 def ratio_grid(band: float, step: float = 2.5e-4) -> Array:
-    """Trial ratios of true to declared speed: 1 - band ... 1 + band."""
+    """Trial ratios of true to declared speed: 1 - band ... 1 + band, at most `step` apart."""
     half = max(1, math.ceil(band / step))
     return 1 + np.linspace(-band, band, 2 * half + 1)
 
@@ -105,6 +105,7 @@ def ratio_grid(band: float, step: float = 2.5e-4) -> Array:
 def comb_score(s: Spectrum, tooth_frequency: float, ratios: Array, top: float = 2500.0, most: int = 20) -> Array:
     """Evidence of a tooth passing comb at each trial ratio: mean over harmonics of log(1 + power/floor).
 
+    Harmonics of tooth_frequency [Hz] up to `top` [Hz], at most `most` of them.
     Each harmonic's share is bounded (power/floor counts up to 1000), so that one strong line which
     is no harmonic cannot pull the comb onto itself.
     """
@@ -131,7 +132,7 @@ def best_ratio(ratios: Array, scores: Array) -> tuple[float, float]:
 
 
 def family_score(s: Spectrum, strongest: float, spindle_frequency: float, teeth: int, ratios: Array) -> Array:
-    """Evidence of lines spaced by the tooth passing and the spindle frequency around the strongest line.
+    """Evidence, at each trial ratio, of lines spaced by tooth passing and spindle frequency around the strongest line.
 
     Works for a tooth passing harmonic and for a chatter line alike, where the comb itself may
     lie below the noise: chatter at H shows H + i f_tooth whatever H is. Mean of log(1 + power/floor)

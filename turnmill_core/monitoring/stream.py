@@ -32,7 +32,7 @@ class Break:
 class Stream:
     """Blocks of one stream in order of index.
 
-    origin: index of its first sample; end: index after its last one; anchors: (sample, stamp ns),
+    sample_rate [Hz]; origin: index of its first sample; end: index after its last one; anchors: (sample, stamp ns),
     ascending, from which stamps are counted; next_end: index after the last sample of the next window.
     """
 
