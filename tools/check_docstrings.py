@@ -70,9 +70,12 @@ def message_fields(text: str) -> set[str]:
 
 
 def mentioned(name: str, text: str) -> bool:
-    """True where a name, or the name in words (tool_speed: tool speed), occurs in a text."""
-    spaced = name.replace("_", " ")
-    return bool(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text) or re.search(rf"\b{re.escape(spaced)}", text, re.I))
+    """True where a name occurs in a text, also in words (tool_speed: tool speed) or as one of many (speeds: speed)."""
+    spaced = re.sub(r"\s+", " ", name.replace("_", " "))
+    one = re.sub(r"ies$", "y", spaced) if spaced.endswith("ies") else spaced.removesuffix("s")
+    words = " ".join(text.split())
+    return bool(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text) or any(
+        re.search(rf"\b{re.escape(form)}s?\b", words, re.I) for form in (spaced, one) if len(form) > 2))
 
 
 class Checker:
