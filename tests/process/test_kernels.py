@@ -86,14 +86,15 @@ def test_a_force_linear_in_time_moves_a_mode_exactly() -> None:
 
 
 def test_decimation_is_a_convolution() -> None:
-    rows = np.random.default_rng(1).normal(size=(400, 3))
+    rows = np.random.default_rng(1).normal(size=(3, 400))
     taps = np.hanning(41)
-    out = np.empty((90, 3))
-    _kernels.decimate(rows, taps, 4, out)
-    expected = np.stack([np.convolve(rows[:, c], taps, "valid")[::4][:90] for c in range(3)], axis=1)
+    phases = np.ascontiguousarray(rows.reshape(3, 100, 4).transpose(0, 2, 1))
+    out = np.full((3, 90), np.nan)
+    _kernels.decimate(phases, taps, out)
+    expected = np.stack([np.convolve(row, taps, "valid")[::4][:90] for row in rows])
     np.testing.assert_allclose(out, expected, atol=1e-12)
     plain = np.empty_like(out)
-    _kernels.decimate.py_func(rows, taps, 4, plain)
+    _kernels.decimate.py_func(phases, taps, plain)
     np.testing.assert_allclose(out, plain, atol=1e-13)
 
 

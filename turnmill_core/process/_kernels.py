@@ -36,7 +36,7 @@ SCALARS = 5
 TIME_TOLERANCE = 0.5e-9
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ramp(u: float) -> float:
     """Step function averaged with a hat of width one step; u in steps past the edge."""
     if u <= -1.0:
@@ -48,7 +48,7 @@ def _ramp(u: float) -> float:
     return 1.0 - 0.5 * (1.0 - u) * (1.0 - u)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ramp_integral(u: float) -> float:
     """Integral of _ramp from minus infinity to u."""
     if u <= -1.0:
@@ -60,7 +60,7 @@ def _ramp_integral(u: float) -> float:
     return u + (1.0 - u) ** 3 / 6.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _past(u: float, length: float) -> float:
     """Share of a slice, `length` steps long, that has passed an edge, averaged over a step; u: its middle."""
     if length < 1e-3:
@@ -68,7 +68,7 @@ def _past(u: float, length: float) -> float:
     return (_ramp_integral(u + 0.5 * length) - _ramp_integral(u - 0.5 * length)) / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _left(rows: Floats, position: float, sin: float, cos: float) -> float:
     """Surface [m] seen along (sin, cos) at a fractional `position` of the periodic table rows (cells, 2).
 
@@ -89,14 +89,14 @@ def _left(rows: Floats, position: float, sin: float, cos: float) -> float:
     return float(x * sin + y * cos)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _hermite(a: float, va: float, b: float, vb: float, h: float, u: float) -> float:
     """Cubic through values a, b and slopes va, vb at the ends of an interval of length h, at fraction u."""
     w = 1.0 - u
     return a * w * w * (1.0 + 2.0 * u) + b * u * u * (3.0 - 2.0 * u) + h * u * w * (va * w - vb * u)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cut(
     now: Floats, turned: float, psi: float, px: float, py: float, tooth_angle: Floats, pitch: Floats, runout: Floats,
     shape: Floats, coefficients: Floats, contact: bool, surface: Floats, place: Floats, force: Floats,
@@ -169,7 +169,7 @@ def _cut(
     return chip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _leave_surface(
     now: Floats, turned: float, dt: float, psi0: float, psi1: float, depth0: float, motion: Floats,
     tooth_angle: Floats, pitch: Floats, runout: Floats, lag_per_depth: float, contact: bool, place: Floats,
@@ -222,7 +222,7 @@ def _leave_surface(
                 node += 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
     """Relative displacement and velocity (4,) of the tool against the workpiece from the modal state."""
     motion[:] = 0.0
@@ -234,7 +234,7 @@ def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
             motion[3] += modes[m, SHAPE_Y] * modal[m, 1]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(
     first: int, dt: float, knots: Floats, modes: Floats, tooth_angle: Floats, pitch: Floats, runout: Floats,
     shape: Floats, coefficients: Floats, contact: bool, modal: Floats, force: Floats, scalars: Floats,
@@ -332,21 +332,25 @@ def advance(
     return written
 
 
-@njit(cache=True)
-def decimate(rows: Floats, taps: Floats, ratio: int, out: Floats) -> None:
-    """Filter `rows` (rows, channels) with symmetric `taps` and keep every `ratio`-th row in `out`.
+@njit(cache=True, error_model="numpy")
+def decimate(phases: Floats, taps: Floats, out: Floats) -> None:
+    """Filter with symmetric `taps` and decimate; out (channels, n) is overwritten.
 
-    out[k] is centred on rows[k * ratio + len(taps) // 2]; the order of summation is fixed.
+    phases (channels, ratio, m): samples first + p + q * ratio of a channel at [p, q]; out[:, k] is
+    centred on the sample first + k * ratio + len(taps) // 2. Every output is summed in the same order.
     """
-    for k in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            total = 0.0
-            for n in range(taps.shape[0]):
-                total += taps[n] * rows[k * ratio + n, c]
-            out[k, c] = total
+    ratio = phases.shape[1]
+    out[:] = 0.0
+    for c in range(out.shape[0]):
+        row = out[c]
+        for n in range(taps.shape[0]):
+            tap = taps[n]
+            source = phases[c, n % ratio, n // ratio : n // ratio + row.shape[0]]
+            for k in range(row.shape[0]):
+                row[k] += tap * source[k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def first_order(white: Floats, pole: float, last: float, out: Floats) -> float:
     """First-order autoregressive noise out[n] = pole out[n-1] + white[n]; returns the last value."""
     for n in range(white.shape[0]):

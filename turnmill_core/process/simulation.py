@@ -225,9 +225,14 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
     count = max(0, (len(state.rows) - width) // ratio + 1)
     if not count:
         return state
-    used = np.ascontiguousarray(state.rows[: (count - 1) * ratio + width, model.columns])
-    signals = np.empty((count, len(model.columns)))
-    _kernels.decimate(used, model.taps, ratio, signals)
+    length = count + (width - 1) // ratio
+    used = np.zeros((len(model.columns), length * ratio))
+    taken = state.rows[: length * ratio, model.columns]
+    used[:, : len(taken)] = taken.T
+    phases = np.ascontiguousarray(used.reshape(len(model.columns), length, ratio).transpose(0, 2, 1))
+    filtered = np.empty((len(model.columns), count))
+    _kernels.decimate(phases, model.taps, filtered)
+    signals = filtered.T.copy()
     background = state.background
     for c, name in enumerate(config.channels):
         if name == "sound":

@@ -129,8 +129,9 @@ def _strongest(values: Floats) -> float:
     """Frequency of the strongest line in `values` (n, 2), in cycles per sample, by a parabola through the peak."""
     if not np.any(values):
         return np.nan
-    windowed = values * np.hanning(len(values))[:, None]
-    power = np.sum(np.abs(np.fft.rfft(windowed, 2 * len(values), axis=0)) ** 2, axis=1)
+    windowed = values.T * np.hanning(len(values))
+    lines = np.fft.rfft(windowed, 2 * len(values))
+    power = np.sum(lines.real**2 + lines.imag**2, axis=0)
     peak = int(np.argmax(power[1:-1])) + 1
     left, top, right = np.log(power[peak - 1 : peak + 2] + np.finfo(float).tiny)
     curve = left - 2 * top + right
