@@ -141,7 +141,7 @@ def test_ctrl_c_stops_in_order_and_leaves_a_complete_bag(
     assert sent == received == judged == kept
     assert interrupted == "True"
     assert sum(1 for _ in read_bag(path, ["sensor_blocks"])) == int(kept) > 20
-    assert len(recorded(path)) == int(verdicts) > 10
+    assert len(recorded(path)) == int(verdicts) >= 10
 
 
 def test_a_node_that_dies_ends_the_run_and_leaves_a_complete_bag(tmp_path: Path, ros_domain: int) -> None:

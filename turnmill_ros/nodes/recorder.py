@@ -62,8 +62,10 @@ class Recorder(LifecycleNode):
 
     @support.transition
     def on_cleanup(self, state: LifecycleState) -> None:
-        """Close the file if it is still open."""
-        self._attempt(self._finish)
+        """Remove the file if nothing was ever recorded to it."""
+        if self._writer is not None:
+            self._writer.discard()
+        self._writer = None
 
     def on_message(self, topic: Topic, data: bytes) -> None:
         """Write one serialized message."""

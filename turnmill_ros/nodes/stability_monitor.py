@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import Future, wait
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,17 +15,8 @@ from turnmill_msgs.srv import GetStability
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, with_cut
 from turnmill_core.operation import Conditions, Operation
-from turnmill_core.prediction import PredictedType
-from turnmill_core.stability.margin import (
-    Margin,
-    StabilityPoint,
-    nearest_stable_speed,
-    searched_depth,
-    stability_lobes,
-    stability_margin,
-    stability_point,
-)
-from turnmill_core.stability.search import depth_limit
+from turnmill_core.stability.lobes import stability_lobes
+from turnmill_core.stability.margin import Margin, searched_depth, stability_margin
 from turnmill_ros import topics
 from turnmill_ros.conversions import axes_from_message, lobes_to_message, margin_to_message, scalar_to_message
 from turnmill_ros.interfaces import ros_types
@@ -45,16 +37,11 @@ class Cut(NamedTuple):
     lower: int
     upper: int
 
-    def at_speeds(self) -> Cut:
-        """The cut without its depth."""
-        return self._replace(depth=0)
-
 
 class StabilityMonitor(LifecycleNode):
     """Evaluates the cut when it changes, in a worker thread; an unchanged cut only gets a new stamp.
 
-    The depth limit is searched once the speeds have settled, and is NaN until then. Live, a worker that is busy
-    leaves cuts out; with `every_change` (replay) it takes them all in turn.
+    Live, a worker that is busy leaves cuts out; with `every_change` (replay) it takes them all in turn.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -64,17 +51,16 @@ class StabilityMonitor(LifecycleNode):
         self._step = declare(self, "change", 0.005, "relative change of speed, depth or immersion that is a new cut",
                              low=1e-6, high=0.1)
         self._every = declare(self, "every_change", False, "evaluate every changed cut, however long it takes (replay)")
-        self._lobe_points = declare(self, "lobe_points", 24, "tool speeds in the stability diagram; 0: none",
+        self._lobe_points = declare(self, "lobe_points", 60, "tool speeds in the stability diagram; 0: none",
                                     low=0, high=400)
         self._match, lossless = support.declare_common(self)
         self._operations, self._next_ns, self._refused = OperationTrack(), 0, ""
-        self._last: tuple[Cut, StabilityPoint] | None = None
-        self._limits: dict[Cut, Margin] = {}
-        self._speeds: dict[Cut, float] = {}
+        self._last: tuple[Cut, Margin] | None = None
         self._pending: list[Future[None]] = []
         self._drawn: set[tuple[str, float]] = set()
         self._received = self._evaluated = self._sent = self._left_out = 0
-        self._worker, self._hurried = Worker("stability"), threading.Event()
+        self._worker, self._drawer, self._hurried = Worker("margin"), Worker("lobes"), threading.Event()
+        self._drawing: list[Future[None]] = []
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.STABILITY_MARGIN, topics.STABILITY_LOBES, *MARGIN_PLOTS)}
         self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
@@ -91,7 +77,7 @@ class StabilityMonitor(LifecycleNode):
         """Compile the solver on the operation that is published."""
         operation = support.wait_for_operation(self, self._operations)
         if operation.tool.structure.modes or operation.workpiece.structure.modes:
-            stability_point(operation, operation.conditions)
+            stability_margin(operation, operation.conditions)
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:
@@ -107,7 +93,7 @@ class StabilityMonitor(LifecycleNode):
         support.drain(self)
         if not self._every:
             self.hurry()
-        while wait(self._pending, 0.1).not_done:
+        while wait([*self._pending, *self._drawing], 0.1).not_done:
             if self._hurried.is_set():
                 break
         support.wait_until_acknowledged(self)
@@ -116,7 +102,7 @@ class StabilityMonitor(LifecycleNode):
     def hurry(self) -> None:
         """Leave out all cuts that wait, and do not wait for what is being computed."""
         self._hurried.set()
-        for pending in self._pending:
+        for pending in (*self._pending, *self._drawing):
             pending.cancel()
 
     def on_axes(self, message: Any) -> None:
@@ -161,49 +147,28 @@ class StabilityMonitor(LifecycleNode):
         except ValueError as error:
             self._refused = f"no prediction: {error}"
             return
-        self._pending = [pending for pending in self._pending if not pending.done()]
+        for done in [pending for pending in self._pending if pending.done()]:
+            self._pending.remove(done)
+            done.result()
         if self._pending and not self._every:
             self._left_out += 1
         else:
             self._pending.append(self._worker.submit(self._evaluate, operation, cut, axes.stamp_ns))
+        key = (operation.sha256, round(cut.workpiece_speed, 3))
+        if self._lobe_points and cut.in_cut and key not in self._drawn:
+            self._drawn.add(key)
+            self._drawing.append(self._drawer.submit(self._draw, operation, cut, axes.stamp_ns))
 
     def _evaluate(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
         """In the worker: the margin of a cut, computed anew only where the cut differs from the last one."""
         key = grid(cut, operation, self._step)
-        last, self._last = self._last, None
         try:
-            new = last is None or last[0] != key
-            point = stability_point(operation, cut) if new else last[1]
-            self._evaluated += new
-            settled, speeds = last is not None and last[0].at_speeds() == key.at_speeds(), key.at_speeds()
-            if settled and speeds not in self._limits:
-                self._publish(operation, self._margin(cut, point, key), stamp_ns)
-                self._limits[speeds] = stability_margin(operation, cut, speed_search=False)
-            chatter = point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP)
-            if not new and chatter and key not in self._speeds:
-                self._speeds[key] = nearest_stable_speed(operation, cut)
-            self._publish(operation, self._margin(cut, point, key), stamp_ns)
-            self._last = key, point
-            if settled:
-                self._draw(operation, cut, stamp_ns)
+            if self._last is None or self._last[0] != key:
+                self._last = key, stability_margin(operation, cut)
+                self._evaluated += 1
+            self._publish(operation, replace(self._last[1], depth=cut.depth), stamp_ns)
         except ValueError as error:
-            self._refused = f"no prediction: {error}"
-
-    def _margin(self, cut: Conditions, point: StabilityPoint, key: Cut) -> Margin:
-        """Margin of a cut from its point and, where it is known, the depth limit at its speeds."""
-        found = self._limits.get(key.at_speeds())
-        intervals = found.stable_depths if found else np.empty((0, 2))
-        limit = depth_limit(intervals, cut.depth) if found else np.nan
-        chatter = point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP)
-        return Margin(
-            tool_speed=cut.tool_speed, workpiece_speed=cut.workpiece_speed, depth=cut.depth, depth_limit=limit,
-            stable_depths=intervals, depth_searched=found.depth_searched if found else np.nan,
-            depth_ratio=np.inf if limit == 0 else max(cut.depth, 0.0) / limit, spectral_radius=point.spectral_radius,
-            multipliers=point.multipliers, predicted_type=point.predicted_type, delay=point.delay,
-            chatter_frequency=point.chatter_frequency, principal_period=point.principal_period,
-            nearest_stable_speed=self._speeds.get(key, np.nan) if chatter else cut.tool_speed,
-            limit_type=found.limit_type if found else PredictedType.UNKNOWN,
-            limit_frequency=found.limit_frequency if found else np.nan)
+            self._last, self._refused = None, f"no prediction: {error}"
 
     def _publish(self, operation: Operation, margin: Margin, stamp_ns: int) -> None:
         if self._hurried.is_set():
@@ -216,16 +181,12 @@ class StabilityMonitor(LifecycleNode):
         self._sent += 1
 
     def _draw(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
-        """In the worker: the stability diagram, once for each operation and settled workpiece speed."""
-        key = (operation.sha256, round(cut.workpiece_speed, 3))
-        if not self._lobe_points or key in self._drawn or not cut.in_cut:
-            return
-        self._drawn.add(key)
+        """In a worker of its own: the stability diagram, once for each operation and workpiece speed."""
         speeds = operation.conditions.tool_speed * np.linspace(0.7, 1.3, self._lobe_points)
-        depths = np.linspace(0.0, searched_depth(operation, cut), 13)[1:]
+        depths = np.linspace(0.0, searched_depth(operation, cut), 33)[1:]
         try:
             lobes = stability_lobes(operation, speeds, depths, cut.workpiece_speed, self._go_on)
-        except InterruptedError:
+        except (InterruptedError, ValueError):
             return
         support.send(self._out[topics.STABILITY_LOBES],
                      lobes_to_message(lobes, stamp_ns, operation.sha256, ros_types()))
