@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from tests.process.cases import samples
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
+from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.scenarios import SCENARIOS
 from turnmill_core.process.simulation import simulate
 from turnmill_core.process.truth import Truth, crossings, join_truth
@@ -89,3 +91,15 @@ def test_air_is_air() -> None:
     assert not truth.touched.any()
     assert np.all(truth.synchronous == 0)
     assert 0.005 < found[:, 0].std() < 0.05
+
+
+@pytest.mark.parametrize("name", shipped_operations())
+def test_every_shipped_operation_can_be_simulated(name: str) -> None:
+    """Rigid ones too; whatever is cut, the samples are finite and a force is there at some time."""
+    op = replace(read_operation(shipped_operations()[name]), schedule=())
+    if op.conditions.depth <= 0:
+        pytest.skip("not in the cut")
+    config = SimulationConfig(sample_rate=12800, channels=("sound", "tool_x", "workpiece_y", "force_y"), force_noise=0.0)
+    found = samples(list(simulate(op, config, 0, duration=0.2)))
+    assert np.all(np.isfinite(found))
+    assert np.abs(found[:, 3]).max() > 2
