@@ -68,6 +68,7 @@ def run(bag: Path, folder: Path) -> None:
     outputs = recorded, verdicts, report = folder / "demo.mcap", folder / "verdicts.json", folder / "report.html"
     for path in outputs:
         path.unlink(missing_ok=True)
+        path.with_name(path.name + ".part").unlink(missing_ok=True)
     began = time.monotonic()
     console.print(f"replaying {bag} through ROS 2 nodes ...", soft_wrap=True)
     result = replay(bag, rate=math.inf, output=recorded)
