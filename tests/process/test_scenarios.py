@@ -99,7 +99,7 @@ def test_every_shipped_operation_can_be_simulated(name: str) -> None:
     op = replace(read_operation(shipped_operations()[name]), schedule=())
     if op.conditions.depth <= 0:
         pytest.skip("not in the cut")
-    config = SimulationConfig(sample_rate=12800, channels=("sound", "tool_x", "workpiece_y", "force_y"), force_noise=0.0)
+    config = SimulationConfig(channels=("sound", "tool_x", "workpiece_y", "force_y"), force_noise=0.0)
     found = samples(list(simulate(op, config, 0, duration=0.2)))
     assert np.all(np.isfinite(found))
     assert np.abs(found[:, 3]).max() > 2
