@@ -27,18 +27,10 @@ class Predictions:
         made = []
         if self.loads:
             time = [(s - start_ns) * 1e-9 for s, _, _ in self.loads]
-            made.append(
-                figures.lines_over_time(
-                    "Predicted load on the tool",
-                    "N, N m",
-                    time,
-                    {
-                        "mean force [N]": [f for _, f, _ in self.loads],
-                        "mean torque [N m]": [t for _, _, t in self.loads],
-                    },
-                    x_range,
-                )
-            )
+            for what, unit, k in (("force on the tool", "N", 1), ("torque on the tool spindle", "N m", 2)):
+                named = {f"mean {what.split()[0]}": [load[k] for load in self.loads]}
+                made.append(figures.lines_over_time(f"Predicted mean {what}", f"{what.split()[0]} [{unit}]", time, named,
+                                                    x_range))
         if self.margins:
             time = [(s - start_ns) * 1e-9 for s, _, _ in self.margins]
             made.append(figures.lines_over_time("Depth of cut and its predicted limit", "depth [mm]", time, {
