@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.conditions import conditions_from_axes, nominal_axes
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.monitoring.verdict import ChatterKind, SpeedSource, Verdict
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import parse_operation, read_operation, shipped_operations
 from turnmill_core.prediction import PredictedType, Prior
+from turnmill_core.stability.margin import stability_point
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 
 RATE = 6400.0
@@ -157,7 +159,26 @@ def test_an_operation_takes_over_at_its_stamp_and_the_old_one_is_judged_to_the_e
     assert results[0] == [(repr(v), sha) for v, sha in expected]
 
 
+def test_computed_predictions_do_not_depend_on_how_topics_interleave() -> None:
+    op = operation()
+    plain = nominal_axes(op)
+    results = []
+    for seed in range(3):
+        feed = MonitorFeed(FeedSettings("computed", "recorded"))
+        steps = interleaved([
+            [lambda feed: feed.operation(START, op)], [lambda feed, b=b: feed.block(b) for b in blocks(op)],
+            [lambda feed, a=a: feed.axes(replace(plain, stamp_ns=a.stamp_ns)) for a in axes(op)]], seed)
+        results.append(run(feed, steps))
+    assert [[repr(v) for v in verdicts] for verdicts in results[1:]] == [[repr(v) for v in results[0]]] * 2
+    expected = stability_point(op, conditions_from_axes(op, plain))
+    assert {v.prior.predicted_type for v in results[0]} == {expected.predicted_type}
+    assert {v.prior.spectral_radius for v in results[0]} == {expected.spectral_radius}
+    assert all(0 <= v.prior.stamp_ns - v.window_end_ns <= 24_000_000 for v in results[0])
+
+
 def test_settings_are_checked() -> None:
+    with pytest.raises(ValueError, match="axes"):
+        FeedSettings(prior="computed", axes="live")
     with pytest.raises(ValueError, match="prior"):
         FeedSettings(prior="guess")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="hop"):

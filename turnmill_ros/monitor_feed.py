@@ -130,8 +130,9 @@ def recorded_operation(path: Path, info: BagInfo) -> Operation:
 def settings_for(info: BagInfo, operation: Operation | None) -> FeedSettings:
     """How a recording is fed, in replay as in analysis.
 
-    Predictions are those that the recorded verdicts used, none where there are no verdicts or where another
-    `operation` is given. Axis states are waited for where the recording has some.
+    Predictions are those that the recorded verdicts used; where there are no verdicts, or where another `operation`
+    is given, they are computed from the axis states. Axis states are waited for where the recording has some; without
+    them there is no prediction.
     """
     counts = {topic.name: 0 for topic in FED}
     for found in info.topics:
@@ -139,8 +140,9 @@ def settings_for(info: BagInfo, operation: Operation | None) -> FeedSettings:
         if topic in FED:
             counts[topic.name] += found.count
     recorded = counts[topics.CHATTER_STATE.name] > 0 and operation is None
-    return FeedSettings(prior="recorded" if recorded else "none",
-                        axes="recorded" if counts[topics.JOINT_STATES.name] else "none")
+    axes = counts[topics.JOINT_STATES.name] > 0
+    return FeedSettings(prior="recorded" if recorded else "computed" if axes else "none",
+                        axes="recorded" if axes else "none")
 
 
 def _plain(judged: Judged) -> tuple[Verdict, ...]:

@@ -30,6 +30,7 @@ from turnmill_core.operation import Operation, require
 from turnmill_core.prediction import Prior
 from turnmill_ros.block_counts import BlockCounts
 from turnmill_ros.operation_track import OperationTrack
+from turnmill_ros.predicted import Predictor
 
 MOST_HELD = 3000
 """Blocks that wait at most; beyond it the oldest is judged with what is known."""
@@ -45,24 +46,27 @@ class FeedSettings:
     """How the monitor is fed.
 
     prior: "live", the newest prediction when a window is decided; "recorded", the one that the recorded
-    verdict on the same window used; "none".
+    verdict on the same window used; "computed", the prediction for the axis state at the end of the block in
+    which the window ends (needs recorded axes); "none".
     axes: "live", windows wait for axis states up to the monitor's timeout; "recorded", blocks wait for those
     that the recording holds, however far apart the topics arrive; "none", there are none.
     changes: settings of the monitor other than those of :func:`config_from_operation`.
     """
 
-    prior: Literal["live", "recorded", "none"] = "live"
+    prior: Literal["live", "recorded", "computed", "none"] = "live"
     axes: Literal["live", "recorded", "none"] = "live"
     changes: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("prior", "axes"):
-            require(getattr(self, name) in ("live", "recorded", "none"), name, getattr(self, name), "",
-                    "live, recorded or none")
+        require(self.prior in ("live", "recorded", "computed", "none"), "prior", self.prior, "",
+                "live, recorded, computed or none")
+        require(self.axes in ("live", "recorded", "none"), "axes", self.axes, "", "live, recorded or none")
+        require(self.prior != "computed" or self.axes == "recorded", "axes", self.axes, "",
+                "recorded, as predictions are computed from them")
 
     def config(self, operation: Operation) -> ChatterConfig:
         """The monitor's settings for an operation."""
-        return replace(config_from_operation(operation), recorded_priors=self.prior == "recorded",
+        return replace(config_from_operation(operation), recorded_priors=self.prior in ("recorded", "computed"),
                        expect_axes=self.axes != "none", **self.changes)  # type: ignore[arg-type]
 
 
@@ -82,7 +86,9 @@ class MonitorFeed:
         self._config: ChatterConfig | None = None
         self._state: MonitorState | None = None
         self._held: deque[SensorBlock] = deque()
-        self._coming: deque[SpindleSpeed] = deque()
+        self._coming: deque[AxisState] = deque()
+        self._axes: AxisState | None = None
+        self._predictor = Predictor()
         self._given: deque[SpindleSpeed] = deque()
         self._newest: dict[str, int] = {"axes": -1, "recorded": -1}
         self._last_prior: Prior | None = None
@@ -105,7 +111,7 @@ class MonitorFeed:
     def axes(self, axes: AxisState) -> Judged:
         """An axis state."""
         self._newest["axes"] = max(self._newest["axes"], axes.stamp_ns)
-        self._coming.append(SpindleSpeed(axes.stamp_ns, axes.velocity[SPINDLE]))
+        self._coming.append(axes)
         if self.settings.axes == "live":
             return self._give_axes(axes.stamp_ns) + self._pump()
         return self._pump()
@@ -201,21 +207,25 @@ class MonitorFeed:
         """Give axis states up to the first one that covers `until_ns`."""
         judged: list[tuple[Verdict, str]] = []
         while self._coming and (not self._given or self._given[-1].stamp_ns < until_ns):
-            self._given.append(self._coming.popleft())
+            self._axes = self._coming.popleft()
+            self._given.append(SpindleSpeed(self._axes.stamp_ns, self._axes.velocity[SPINDLE]))
             judged += self._give(self._given[-1])
         while self._given and self._given[-1].stamp_ns - self._given[0].stamp_ns > KEPT_AXES_NS:
             self._given.popleft()
         return tuple(judged)
 
     def _give_recorded(self) -> Judged:
-        """Give each window that is due the prior of its recorded verdict; none where it has no recorded verdict."""
+        """Give each window that is due its prior: computed, or of its recorded verdict (none where it has none)."""
         judged: list[tuple[Verdict, str]] = []
-        while self.settings.prior == "recorded" and self._state is not None:
+        computed = None
+        if self.settings.prior == "computed" and self._running is not None and self._axes is not None:
+            computed = self._predictor.prior(self._running, self._axes)
+        while self.settings.prior in ("recorded", "computed") and self._state is not None:
             streams = self._state.streams
             due = next(((s.device, s.stream_id, s.next_end - 1) for s in streams if s.next_end <= s.end), None)
             if due is None:
                 break
-            new = self._give(RecordedPrior(due[1], due[2], self._recorded.pop(due, None)))
+            new = self._give(RecordedPrior(due[1], due[2], self._recorded.pop(due, computed)))
             if not new:
                 break
             judged += new

@@ -6,6 +6,7 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 
+from turnmill_core.machine.conditions import nominal_axes
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.verdict import Verdict
 from turnmill_ros import topics
@@ -22,6 +23,7 @@ from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from turnmill_ros.node_table import VERDICT_PLOTS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import declare, declare_config
+from turnmill_ros.predicted import Predictor
 
 RANGES = {
     "window": (0.02, 10.0), "revolutions": (1.0, 100.0), "longest_window": (0.02, 60.0), "hop": (0.005, 1.0),
@@ -45,7 +47,7 @@ class ChatterMonitor(LifecycleNode):
             self, ChatterConfig(teeth=1), RANGES, skip=("teeth", "nominal_speed", "equal_pitch", "expect_axes",
                                                         "recorded_priors"))
         self._settings = FeedSettings(
-            prior=declare(self, "prior", "live", "predictions: live, recorded (of recorded verdicts) or none"),
+            prior=declare(self, "prior", "live", "predictions: live, recorded (of verdicts), computed, none"),
             axes=declare(self, "axes", "live", "axis states: live (wait up to speed_timeout), recorded (wait) or none"),
             changes=declared)
         self._match, lossless = support.declare_common(self)
@@ -70,7 +72,10 @@ class ChatterMonitor(LifecycleNode):
     @support.transition
     def on_configure(self, state: LifecycleState) -> None:
         """Compile the monitor's numerics for the operation that is published."""
-        self._feed.warm(support.wait_for_operation(self, self._feed.operations))
+        operation = support.wait_for_operation(self, self._feed.operations)
+        self._feed.warm(operation)
+        if self._settings.prior == "computed":
+            Predictor().prior(operation, nominal_axes(operation))
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import Future, wait
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -25,17 +25,7 @@ from turnmill_ros.nodes import _support as support
 from turnmill_ros.nodes._worker import Worker
 from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.parameters import declare
-
-
-class Cut(NamedTuple):
-    """A cut on a grid of small relative steps, and its operation."""
-
-    operation: str
-    tool_speed: int
-    workpiece_speed: int
-    depth: int
-    lower: int
-    upper: int
+from turnmill_ros.predicted import CHANGE, Cut, grid
 
 
 class StabilityMonitor(LifecycleNode):
@@ -48,7 +38,7 @@ class StabilityMonitor(LifecycleNode):
         super().__init__("stability_monitor", **kwargs)
         self._period_ns = round(1e9 / declare(
             self, "rate", topics.STABILITY_MARGIN.rate, "Hz, margins per second of axis time", low=0.1, high=50.0))
-        self._step = declare(self, "change", 0.005, "relative change of speed, depth or immersion that is a new cut",
+        self._step = declare(self, "change", CHANGE, "relative change of speed, depth or immersion that is a new cut",
                              low=1e-6, high=0.1)
         self._every = declare(self, "every_change", False, "evaluate every changed cut, however long it takes (replay)")
         self._lobe_points = declare(self, "lobe_points", 60, "tool speeds in the stability diagram; 0: none",
@@ -198,18 +188,6 @@ class StabilityMonitor(LifecycleNode):
     def _values(self) -> dict[str, object]:
         return {"joint_states_received": self._received, "margins_sent": self._sent, "cuts_evaluated": self._evaluated,
                 "cuts_left_out": self._left_out, "cuts_waiting": sum(not pending.done() for pending in self._pending)}
-
-
-def grid(cut: Conditions, operation: Operation, change: float) -> Cut:
-    """The cut in steps of `change` relative to the operation: equal for cuts that differ less than a step."""
-    nominal, radius = operation.conditions, operation.tool.radius
-
-    def steps(value: float, scale: float) -> int:
-        return round(value / (change * abs(scale))) if scale else 0
-
-    return Cut(operation.sha256, steps(cut.tool_speed, nominal.tool_speed),
-               steps(cut.workpiece_speed, nominal.workpiece_speed), steps(max(cut.depth, 0.0), nominal.depth),
-               steps(cut.cross_feed_span[0], radius), steps(cut.cross_feed_span[1], radius))
 
 
 if __name__ == "__main__":
