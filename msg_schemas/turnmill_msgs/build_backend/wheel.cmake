@@ -7,6 +7,20 @@ if(SKBUILD)
   # Libraries lie in <prefix>/lib, extension modules in <prefix>/lib/pythonX.Y/site-packages/turnmill_msgs.
   set(CMAKE_INSTALL_RPATH "$ORIGIN:$ORIGIN/../../..")
   set(BUILD_TESTING OFF CACHE BOOL "" FORCE)
+  # rclpy loads the C typesupport only. The C++ libraries would take half of the time; they are compiled from an empty
+  # file and left out of the wheel (wheel.exclude in pyproject.toml).
+  file(WRITE "${CMAKE_BINARY_DIR}/empty.cpp" "")
+  function(_turnmill_skip_cpp_typesupport)
+    get_property(targets DIRECTORY "${CMAKE_SOURCE_DIR}" PROPERTY BUILDSYSTEM_TARGETS)
+    foreach(target IN LISTS targets)
+      if(target MATCHES "__rosidl_typesupport_(cpp|fastrtps_cpp|introspection_cpp)$")
+        set_target_properties(${target} PROPERTIES SOURCES "${CMAKE_BINARY_DIR}/empty.cpp")
+        string(REPLACE "${PROJECT_NAME}__" "" generator ${target})
+        file(MAKE_DIRECTORY "${CMAKE_BINARY_DIR}/${generator}/${PROJECT_NAME}")  # of headers that are not generated
+      endif()
+    endforeach()
+  endfunction()
+  cmake_language(DEFER DIRECTORY "${CMAKE_SOURCE_DIR}" CALL _turnmill_skip_cpp_typesupport)
 endif()
 
 # The ROS wheels' imported targets name include folders of the machine that built them.
