@@ -113,27 +113,29 @@ def _cut(
     """
     teeth, slices = surface.shape[0], surface.shape[1]
     cells = surface.shape[2] // 2 if teeth == 1 else surface.shape[2]
-    radius, bar_radius, lag_per_depth = shape
+    radius, bar_radius, lag_per_depth, longest_pitch = shape[0], shape[1], shape[2], shape[3]
     cell = 2.0 * math.pi / cells
     depth = max(0.0, now[DEPTH])
     start, leave = now[START], now[EXIT]
     lag_step = lag_per_depth * depth / slices
     lag_all = (slices - 1) * lag_step
-    margin = 0.5 * abs(lag_step) + 4.0 * max(cell, turned) + 1.5 * pitch.max() * now[SLIP]
+    margin = 0.5 * abs(lag_step) + 4.0 * max(cell, turned) + 1.5 * longest_pitch * now[SLIP]
     margin += depth * max(abs(now[START_SLOPE]), abs(now[EXIT_SLOPE]))
     first = start - margin
-    cos_step, sin_step = math.cos(lag_step), math.sin(lag_step)
+    cos_step, sin_step = 2.0, 0.0  # found once a tooth is near the cut
     length = abs(lag_step) / turned
-    chip = 0.0
-    force[:] = 0.0
-    place[:, :, 3] = 0.0
+    chip = fx = fy = fz = 0.0
     for j in range(teeth):
+        for s in range(slices):
+            place[j, s, 3] = 0.0
         period = pitch[j] / now[TOOL_SPEED]
         ahead = j + 1 if j + 1 < teeth else 0
         leading = now[TOOL_ANGLE] + tooth_angle[j] - 0.5 * lag_step + max(0.0, -lag_all)
         leading -= 2.0 * math.pi * math.floor((leading - first) / (2.0 * math.pi))
         if leading - abs(lag_all) > leave + margin:
             continue
+        if cos_step > 1.0:
+            cos_step, sin_step = math.cos(lag_step), math.sin(lag_step)
         phi = leading - max(0.0, -lag_all) + lag_step
         sin, cos = math.sin(phi), math.cos(phi)
         for s in range(slices):
@@ -163,9 +165,10 @@ def _cut(
             chip = max(chip, h)
             tangential = width * (coefficients[0] * h + coefficients[3])
             radial = width * (coefficients[1] * h + coefficients[4])
-            force[0] -= radial * sin + tangential * cos
-            force[1] -= radial * cos - tangential * sin
-            force[2] -= width * (coefficients[2] * h + coefficients[5])
+            fx -= radial * sin + tangential * cos
+            fy -= radial * cos - tangential * sin
+            fz -= width * (coefficients[2] * h + coefficients[5])
+    force[0], force[1], force[2] = fx, fy, fz
     return chip
 
 
@@ -212,7 +215,7 @@ def _leave_surface(
                 y = cos * runout[j] + _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 here = int(node) % surface.shape[2]
                 if contact and place[j, s, 2] >= 0.0:
-                    old = int(node - cells) % surface.shape[2]  # a revolution ago (one tooth), or the same place
+                    old = here if teeth > 1 else int(node - cells) % surface.shape[2]  # one tooth: a revolution ago
                     feed_x = now[FEED_X] + now[FEED_X_SLOPE] * place[j, s, 2]
                     old_x = surface[ahead, s, old, 0] - feed_x * period
                     old_y = surface[ahead, s, old, 1] - now[FEED_Y] * period
@@ -225,13 +228,14 @@ def _leave_surface(
 @njit(cache=True, error_model="numpy")
 def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
     """Relative displacement and velocity (4,) of the tool against the workpiece from the modal state."""
-    motion[:] = 0.0
+    x = y = vx = vy = 0.0
     for m in range(modes.shape[0]):
         if modes[m, SIDE] != 0.0:
-            motion[0] += modes[m, SHAPE_X] * modal[m, 0]
-            motion[1] += modes[m, SHAPE_Y] * modal[m, 0]
-            motion[2] += modes[m, SHAPE_X] * modal[m, 1]
-            motion[3] += modes[m, SHAPE_Y] * modal[m, 1]
+            x += modes[m, SHAPE_X] * modal[m, 0]
+            y += modes[m, SHAPE_Y] * modal[m, 0]
+            vx += modes[m, SHAPE_X] * modal[m, 1]
+            vy += modes[m, SHAPE_Y] * modal[m, 1]
+    motion[0], motion[1], motion[2], motion[3] = x, y, vx, vy
 
 
 @njit(cache=True, error_model="numpy")
@@ -243,7 +247,7 @@ def advance(
     """Integrate the cut over len(raw) steps of `dt`, from step index `first`; returns the marks written.
 
     knots (K, 12): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
-    (teeth,); shape (3,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m];
+    (teeth,); shape (4,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m], longest pitch;
     coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m]; contact: the tool can leave the material.
     Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
     surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 11), see RAW; marks
@@ -284,13 +288,14 @@ def advance(
                 px += modes[m, SHAPE_X] * (free[m, 0] + modes[m, C1] * load)
                 py += modes[m, SHAPE_Y] * (free[m, 0] + modes[m, C1] * load)
         chip = 0.0
-        force[:] = 0.0
+        force[0] = force[1] = force[2] = 0.0
         if turning:
             chip = _cut(now, turned, psi1, px, py, tooth_angle, pitch, runout, shape, coefficients, contact, surface,
                         place, force)
 
         # The modes at the end of the step, the force linear over it.
-        raw[i, :] = 0.0
+        for c in range(1, 8):
+            raw[i, c] = 0.0
         for m in range(modes.shape[0]):
             load = modes[m, SHAPE_X] * force[0] + modes[m, SHAPE_Y] * force[1] + modes[m, SHAPE_Z] * force[2]
             q = free[m, 0] + modes[m, C1] * load
@@ -305,8 +310,9 @@ def advance(
                 raw[i, column + 1] += side * modes[m, SHAPE_Y] * q
                 raw[i, column + 2] += side * modes[m, SHAPE_Z] * q
         raw[i, 0] = now[TOOL_ANGLE]
-        raw[i, 8:11] = force
-        motion[0] = motion[1]
+        raw[i, 8], raw[i, 9], raw[i, 10] = force[0], force[1], force[2]
+        for c in range(4):
+            motion[0, c] = motion[1, c]
         _move(modes, modal, motion[1])
         if turning:
             _leave_surface(now, turned, dt, psi0, psi1, scalars[LAST_DEPTH], motion, tooth_angle, pitch, runout,

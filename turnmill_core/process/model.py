@@ -29,12 +29,12 @@ TRUTH_HOP = 0.03  # s, about
 class ProcessModel:
     """Operation and configuration as the integrator wants them.
 
-    dt [s]; modes (M, 16): see _kernels; tooth_angle, pitch [rad], runout [m] (teeth,); shape (3,):
-    radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m]; coefficients (6,): Ktc,
-    Krc, Kac [Pa], and Kte, Kre, Kae per height instead of per edge length [N/m]; slices, cells of the
-    surface; taps: anti-alias filter; columns: of the raw signals, one per channel; teeth; turns: tool
-    revolutions in a principal period; uneven: the teeth are not equally spaced; hop: principal periods
-    from one window of the truth to the next.
+    dt [s]; modes (M, 16): see _kernels; tooth_angle, pitch [rad], runout [m] (teeth,); shape (4,):
+    radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m], longest pitch [rad];
+    coefficients (6,): Ktc, Krc, Kac [Pa], and Kte, Kre, Kae per height instead of per edge length
+    [N/m]; slices, cells of the surface; taps: anti-alias filter; columns: of the raw signals, one per
+    channel; teeth; turns: tool revolutions in a principal period; uneven: the teeth are not equally
+    spaced; hop: principal periods from one window of the truth to the next.
     """
 
     op: Operation
@@ -69,7 +69,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         op=op, dt=dt, modes=_modes(op, config.sound, dt),
         tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
         runout=np.array(tool.runout or (0.0,) * tool.teeth),
-        shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth]),
+        shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth,
+                        pitch.max()]),
         coefficients=np.array([material.Ktc, material.Krc, material.Kac, *edge]),
         slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
