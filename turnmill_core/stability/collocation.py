@@ -16,25 +16,33 @@ teeth in the cut, pitch and delay; convergence is spectral in the number of node
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.stability import _kernels
-from turnmill_core.stability.problem import StabilityProblem, contact_basis
+from turnmill_core.stability._kernels import cut, operators, spectrum
+from turnmill_core.stability._kernels.cut import MOST_NODES
+from turnmill_core.stability.floquet import FloquetVerdict, verdict_from_map
+from turnmill_core.stability.problem import Engagement, StabilityProblem, contact_basis
 from turnmill_core.stability.semidiscretization import PeriodMap
 from turnmill_core.structure.modal import LinearStructure
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-MOST_NODES = 24
 QUADRATURE = 4
 """Gauss points between neighbouring nodes."""
-BASE_NODES = 4.0
+BASE_NODES = 1.0
 """Nodes of an element in which nothing oscillates, for a spectral radius good to about 1e-4."""
+REFINEMENTS = (1.0, 4.0, 8.0, 12.0)
+"""Base nodes that are tried in turn until the spectral radius has settled."""
+FINER = 3.0
+"""Base nodes that are added to estimate the error."""
+TOLERANCE = 3e-6
+"""Residual of the leading multiplier at which Arnoldi's method ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +56,10 @@ class ModalBlocks:
     C: Complexes
     B: Complexes
     basis: Floats
+
+    def outputs(self, velocity: bool) -> Complexes:
+        """Rows of the contact displacement, and below them of its velocity where it is wanted."""
+        return np.vstack([self.C, self.C * self.lam]) if velocity else self.C
 
 
 @lru_cache(maxsize=64)
@@ -68,7 +80,11 @@ def modal_blocks(structure: LinearStructure) -> ModalBlocks:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Gauss nodes, quadrature between them, Lagrange polynomials and interpolation weights, by number of nodes."""
+    """Everything of an element that depends on its number of nodes n only; row n belongs to n nodes.
+
+    nodes: Gauss nodes in (0, 1). points, weights: quadrature between neighbouring nodes. ell: Lagrange polynomials of
+    the nodes at the points. support, bary: start, nodes and end, and their barycentric weights.
+    """
 
     nodes: Floats
     points: Floats
@@ -120,27 +136,121 @@ def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes
     base_nodes: nodes of an element beyond what its oscillation asks for; more is more accurate. probes: number of
     equally spaced times at which the contact displacement is observed.
     """
-    matrices, shown = _assemble(problem, np.ones(1), base_nodes, probes)
-    return PeriodMap(matrices[0], problem.period, np.einsum("ar,krl->kal", modal_blocks(problem.structure).basis, shown[0]))
-
-
-def _assemble(problem: StabilityProblem, scales: Floats, base_nodes: float, probes: int) -> tuple[Floats, Floats]:
     m, t, e = modal_blocks(problem.structure), tables(), problem.engagement
     omega, period = problem.tool_speed, problem.tool_speed * problem.period
-    delays = omega * np.array(problem.delays)
-    shift = float(delays[0] - period) if problem.uniform else 0.0
-    rate = float(np.abs(m.lam).max()) / omega
-    split = shift % period if abs(shift) > 0.02 and abs(problem.helix_lag) * e.depth < 0.1 else 0.0
+    height, start, stop = e.height.copy(), e.start.copy(), e.exit.copy()  # writable, as the kernels expect
+    c, friction = problem.process_damping
+    delays, offsets, lag = omega * np.array(problem.delays), problem.tooth_angles, problem.helix_lag
+    rate = float(np.sqrt(np.abs(m.lam).max() ** 2 + _stiffening(problem) * e.depth)) / omega
+    shift = _shift(problem)
+    split = shift % period if abs(shift) > 0.02 and abs(lag) * e.depth < 0.1 else 0.0
     longest = 0.9 * float(delays.min()) * (1 - problem.delay_variation)
-    joined = problem.uniform and problem.delay_variation == 0
-    offsets = problem.tooth_angles
-    lead = max(0.0, float(delays.max()) * (1 + problem.delay_variation) - period)
-    edges, nodes, origin = _kernels.layout(
-        period, offsets, problem.helix_lag, e.height, e.start, e.exit, split, lead * 1.001, rate, base_nodes, longest)
-    element, node, angle, delay, c, b = _kernels.channels(
-        edges, nodes, origin, period, t.nodes, offsets, delays, problem.delay_variation, joined, m.basis,
-        problem.helix_lag, e.height, e.start, e.exit, *problem.coefficients)
-    times = period / max(probes, 1) * np.arange(probes)
-    return _kernels.period_matrices(  # type: ignore[no-any-return]
-        scales, m.lam, m.C, m.B, omega, period, edges, nodes, element, node, angle, delay, c, b, times, t.nodes,
-        t.points, t.weights, t.ell, t.support, t.bary)
+    lead = 1.001 * max(0.0, float(delays.max()) * (1 + problem.delay_variation) - period)
+    edges, nodes, origin = cut.layout(
+        period, offsets, lag, height, start, stop, split, lead, rate, base_nodes, longest)
+    element, node, angle, delay, now, past, b = cut.channels(
+        edges, nodes, origin, t.nodes, offsets, delays, problem.delay_variation, _joined(problem), problem.rotating,
+        omega, c, friction, m.basis, lag, height, start, stop, *problem.coefficients)
+    outputs = m.outputs(c > 0)
+    times = np.repeat(period / max(probes, 1) * np.arange(probes), 2)
+    weight = np.zeros((times.size, len(outputs)))
+    weight[:, :m.basis.shape[1]] = np.tile(m.basis, (probes, 1))
+    matrix, shown = operators.dense_map(
+        m.lam, outputs, m.B, omega, period, edges, nodes, element, node, angle, delay, now, past, b, times, weight,
+        t.nodes, t.points, t.weights, t.ell, t.support, t.bary)
+    return PeriodMap(matrix, problem.period, shown.reshape(probes, 2, matrix.shape[0]))
+
+
+def _stiffening(problem: StabilityProblem) -> float:
+    """Largest stiffening of a mode by the cut, per depth [1/(s2 m)]: it raises the frequencies to be resolved."""
+    s = problem.structure
+    return float(np.linalg.norm(problem.coefficients) * np.linalg.norm(s.C[:2] @ s.A @ s.B, 2))
+
+
+def _joined(problem: StabilityProblem) -> bool:
+    """Whether all teeth have one delay at all times, so that their forces can be added."""
+    return problem.uniform and problem.delay_variation == 0
+
+
+def _shift(problem: StabilityProblem) -> float:
+    """Tool rotation [rad] by which the delay exceeds the tooth period, 0 where it differs from tooth to tooth."""
+    return problem.tool_speed * problem.delays[0] - problem.pitch[0] if problem.uniform else 0.0
+
+
+def solve(problem: StabilityProblem, tolerance: float = 3e-5) -> FloquetVerdict:
+    """Verdict of one problem, with more nodes until the spectral radius is good to `tolerance` by its own estimate."""
+    error = np.inf
+    for base_nodes in REFINEMENTS:
+        found = period_map(problem, base_nodes, _probes(problem))
+        result = verdict_from_map(found.matrix, found.displacement, found.period)
+        error = abs(result.spectral_radius - abs(leading_multiplier(problem, base_nodes + FINER)))
+        if error < tolerance * max(1.0, result.spectral_radius):
+            break
+    return replace(result, error=error)
+
+
+def _probes(problem: StabilityProblem) -> int:
+    """Times a period at which the displacement is observed, four to the shortest vibration wave."""
+    fastest = float(np.abs(modal_blocks(problem.structure).lam).max())
+    return max(32, 2 * int(np.ceil(2 * fastest * problem.period / (2 * np.pi))))
+
+
+@dataclass(frozen=True, eq=False)
+class DepthSeries:
+    """One cut at several depths, prepared for :func:`series_multipliers`.
+
+    problem: one of them, which gives all that they share. heights (S, k) [m], starts, stops (S, k, arcs) [rad]:
+    engagements. proportional: they differ by a factor of the depth only and the edge is straight. stiffening
+    [1/(s2 m)]: largest stiffening of a mode by a depth.
+    """
+
+    problem: StabilityProblem
+    heights: Floats
+    starts: Floats
+    stops: Floats
+    proportional: bool
+    stiffening: float
+
+
+def depth_series(problem: StabilityProblem, heights: Floats, starts: Floats, stops: Floats) -> DepthSeries:
+    """Prepare a series with the engagements heights (S, k), starts, stops (S, k, arcs), else as `problem`."""
+    same = (problem.helix_lag == 0 and heights.shape[1] == 2 and bool(np.all(starts == starts[0, 0]))
+            and bool(np.all(stops == stops[0, 0])))
+    return DepthSeries(problem, heights, starts, stops, same, _stiffening(problem))
+
+
+def series_multipliers(
+    series: DepthSeries, tool_speed: float, delays: Sequence[float], variation: Floats, base_nodes: float = BASE_NODES,
+) -> Complexes:
+    """Leading multiplier (S,), Im >= 0, at every depth of a series at tool_speed [rad/s].
+
+    delays (teeth,) [s]; variation (S,): delay variation at each depth. Neighbouring depths start from each other's
+    leading solutions. base_nodes: as in period_map.
+    """
+    p, t, S = series.problem, tables(), len(series.heights)
+    m, (c, friction) = modal_blocks(p.structure), p.process_damping
+    angles = tool_speed * np.array(delays)
+    equal = p.equal_pitch and float(np.ptp(angles)) < 1e-12 * angles[0]
+    period = p.pitch[0] if equal and not p.rotating else 2 * np.pi
+    joined = equal and not np.any(variation)
+    multipliers, residuals = np.empty(S, dtype=np.complex128), np.empty(S)
+    spectrum.column(
+        m.lam, m.outputs(c > 0), m.B, m.basis, tool_speed, period, p.tooth_angles, angles, variation,
+        angles[0] - p.pitch[0] if equal else 0.0, joined, p.rotating, c, friction, p.helix_lag, series.heights,
+        series.starts, series.stops, *p.coefficients, series.proportional, base_nodes, series.stiffening, t.nodes,
+        t.points, t.weights, t.ell, t.support, t.bary, TOLERANCE, multipliers, residuals)
+    for i in np.flatnonzero(residuals > 10 * TOLERANCE * np.maximum(1, np.abs(multipliers))):
+        one = p.at(tool_speed=tool_speed, delays=tuple(delays), delay_variation=float(variation[i]),
+                   engagement=Engagement(series.heights[i], series.starts[i], series.stops[i]))
+        mu: Complexes = np.linalg.eigvals(period_map(one, base_nodes).matrix).astype(np.complex128)
+        leading = mu[np.argmax(np.abs(mu))]
+        multipliers[i] = complex(leading.real, abs(leading.imag))
+    return multipliers
+
+
+def leading_multiplier(problem: StabilityProblem, base_nodes: float = BASE_NODES) -> complex:
+    """Leading multiplier, Im >= 0, of one problem; base_nodes: as in period_map."""
+    e = problem.engagement
+    series = depth_series(problem, *(np.array(v)[None] for v in (e.height, e.start, e.exit)))
+    variation = np.array([problem.delay_variation])
+    return complex(series_multipliers(series, problem.tool_speed, problem.delays, variation, base_nodes)[0])

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lu_factor, lu_solve
 
 from turnmill_core.prediction import PredictedType
 
@@ -49,7 +50,8 @@ class FloquetVerdict:
     magnitude [1]. predicted_type: STABLE, HOPF or FLIP. flips: number of real multipliers below -1
     (2: secondary flip). lines: spectrum of the leading Floquet solution, strongest line first, whether
     it grows or decays. chatter_frequency [Hz]: the strongest line where unstable, else NaN. period
-    [s]: principal period that the multipliers belong to.
+    [s]: principal period that the multipliers belong to. error [1]: the solver's own estimate of the error
+    of the spectral radius, NaN where it made none.
     """
 
     multipliers: Complexes
@@ -59,6 +61,7 @@ class FloquetVerdict:
     lines: tuple[ChatterLine, ...]
     chatter_frequency: float
     period: float
+    error: float = float("nan")
 
 
 def classify(multipliers: ArrayLike) -> PredictedType:
@@ -90,7 +93,7 @@ def spectrum_lines(
 ) -> tuple[ChatterLine, ...]:
     """Strongest lines of the Floquet solution with this multiplier.
 
-    displacement (k, axes): complex displacement of the eigenvector at k equally spaced times i T / k.
+    displacement (k, axes): complex displacement of the eigenvector at k equally spaced times i T / k of period T [s].
     Only orders |q| < k/2 are resolved. The amplitudes are those of the periodic part, so that growth does
     not weigh on them.
     """
@@ -130,9 +133,19 @@ def verdict(multipliers: ArrayLike, leading_displacement: Complexes, period: flo
 
 def verdict_from_map(matrix: Floats, displacement: Floats, period: float) -> FloquetVerdict:
     """Verdict from the matrix (L, L) over one period and its displacement observer (k, 3, L)."""
-    mu, vectors = np.linalg.eig(matrix)
-    if not np.all(np.isfinite(mu)):
-        raise ValueError("a Floquet multiplier is not finite, expected finite multipliers; take more steps")
-    order = np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))
-    leading = vectors[:, order[0]]
-    return verdict(mu, displacement @ leading, period)
+    if not np.all(np.isfinite(matrix)):
+        raise ValueError("the map over one period is not finite, expected finite numbers; take more steps")
+    mu = np.linalg.eigvals(matrix).astype(np.complex128)
+    leading = mu[np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))[0]]
+    return verdict(mu, displacement @ eigenvector(matrix, complex(leading)), period)
+
+
+def eigenvector(matrix: Floats, value: complex) -> Complexes:
+    """Unit eigenvector of `matrix` (L, L) for its eigenvalue `value`, by inverse iteration."""
+    near = value + (1e-10 * abs(value) or 1e-300)
+    factors = lu_factor(matrix - near * np.eye(len(matrix)), check_finite=False)
+    vector = np.exp(1j * np.arange(len(matrix)))
+    for _ in range(3):
+        vector = lu_solve(factors, vector, check_finite=False)
+        vector = vector / np.linalg.norm(vector)
+    return np.asarray(vector, dtype=np.complex128)

@@ -7,27 +7,25 @@ The margin is 1 - depth / depth limit: positive in the first stable interval.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.prediction import PredictedType
+from turnmill_core.stability.collocation import solve
 from turnmill_core.stability.delay import DelayModel
-from turnmill_core.stability.floquet import FloquetVerdict, chatter_family, classify, verdict_from_map
-from turnmill_core.stability.operating_point import at_depth, stability_problem
-from turnmill_core.stability.problem import StabilityProblem
-from turnmill_core.stability.semidiscretization import period_map
+from turnmill_core.stability.floquet import chatter_family
+from turnmill_core.stability.lobes import Lobes as Lobes
+from turnmill_core.stability.lobes import stability_lobes as stability_lobes
+from turnmill_core.stability.operating_point import depth_family, stability_problem
+from turnmill_core.stability.search import depth_limit, stable_depths
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 NAN = float("nan")
 
-SCAN_DEPTHS = 24
-"""Depths at which the spectral radius is sampled before its crossings of 1 are refined."""
 SPEED_STEP = 0.01
 SPEED_RANGE = 0.5
 """The nearest stable speed is sought in steps of 1 % up to 50 % above and below the present one."""
@@ -83,35 +81,6 @@ class Margin:
     limit_frequency: float
 
 
-@dataclass(frozen=True, eq=False)
-class Lobes:
-    """Stability diagram at one workpiece speed.
-
-    tool_speeds (n,) [rad/s]; depths (m,) [m]; spectral_radius (m, n) [1]; predicted_type (m, n),
-    values of PredictedType; depth_limit (n,) [m], the lowest stability limit at each tool speed, the
-    largest depth where there is none.
-    """
-
-    workpiece_speed: float
-    tool_speeds: Floats
-    depths: Floats
-    spectral_radius: Floats
-    predicted_type: NDArray[np.uint8]
-    depth_limit: Floats
-
-
-def solve(problem: StabilityProblem) -> FloquetVerdict:
-    """Verdict of one problem."""
-    found = period_map(problem)
-    return verdict_from_map(found.matrix, found.displacement, found.period)
-
-
-def leading(problem: StabilityProblem) -> tuple[float, PredictedType]:
-    """Spectral radius and type of one problem, without the chatter frequencies."""
-    multipliers = np.linalg.eigvals(period_map(problem).matrix)
-    return float(np.abs(multipliers).max()), classify(multipliers)
-
-
 def stability_point(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> StabilityPoint:
     """Stability of `op` at `conditions`; NO_CUT where the tool does not touch the workpiece.
 
@@ -163,12 +132,12 @@ def stability_margin(
     if not (conditions.tool_speed > 0 and conditions.radial_immersion > 0):
         return Margin(**base, depth_limit=NAN, stable_depths=np.empty((0, 2)), depth_ratio=NAN,  # type: ignore[arg-type]
                       nearest_stable_speed=NAN, limit_type=PredictedType.UNKNOWN, limit_frequency=NAN)
-    problem_at = _by_depth(op, conditions, delay_model)
-    intervals = stable_depths(problem_at, searched)
-    limit = _limit(intervals, conditions.depth)
+    family = depth_family(op, conditions, searched, delay_model)
+    intervals = stable_depths(family)
+    limit = depth_limit(intervals, conditions.depth)
     limit_type, limit_frequency = PredictedType.UNKNOWN, NAN
     if 0 < limit < searched:
-        above = solve(problem_at(limit * 1.01))
+        above = solve(family.problem(min(limit * 1.005, searched)))
         limit_type, limit_frequency = above.predicted_type, above.chatter_frequency
     nearest = conditions.tool_speed
     if point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP):
@@ -178,106 +147,21 @@ def stability_margin(
                   nearest_stable_speed=nearest, limit_type=limit_type, limit_frequency=limit_frequency)
 
 
-def _by_depth(op: Operation, conditions: Conditions, delay_model: DelayModel) -> Callable[[float], StabilityProblem]:
-    return lambda depth: stability_problem(op, at_depth(op, conditions, depth), delay_model)
-
-
-def _limit(intervals: Floats, depth: float) -> float:
-    """Upper end of the interval that holds `depth` or lies next below it; 0 without one."""
-    below = intervals[intervals[:, 0] <= max(depth, 0.0)] if intervals.size else intervals
-    return float(below[-1, 1]) if below.size else 0.0
-
-
-def stable_depths(
-    problem_at: Callable[[float], StabilityProblem], searched: float, scan: int = SCAN_DEPTHS, tolerance: float = 1e-3,
-) -> Floats:
-    """Stable depth intervals (n, 2) [m] in (0, searched]: a scan, then each crossing of |mu| = 1 is refined.
-
-    problem_at: the problem at a depth [m]. tolerance: of a crossing, relative to it. An island thinner than
-    searched / scan may be missed. The first interval begins at 0, where the damped structure is stable.
-    """
-    depths = np.linspace(0.0, searched, scan + 1)
-    values = [-1.0, *(leading(problem_at(float(a)))[0] - 1 for a in depths[1:])]
-    edges = [0.0]
-    for i in range(scan):
-        if (values[i] < 0) != (values[i + 1] < 0):
-            edges.append(_crossing(problem_at, depths[i], depths[i + 1], values[i], values[i + 1], tolerance))
-    if values[-1] < 0:
-        edges.append(searched)
-    return np.array(edges).reshape(-1, 2)
-
-
-def _crossing(
-    problem_at: Callable[[float], StabilityProblem], low: float, high: float, f_low: float, f_high: float,
-    tolerance: float,
-) -> float:
-    """Depth [m] where |mu| = 1 between two depths with opposite signs (Illinois regula falsi)."""
-    for _ in range(60):
-        middle = high - f_high * (high - low) / (f_high - f_low)
-        value = leading(problem_at(float(middle)))[0] - 1
-        if (value < 0) == (f_high < 0):
-            f_low *= 0.5
-        else:
-            low, f_low = high, f_high
-        high, f_high = middle, value
-        if abs(high - low) <= tolerance * max(high, low) or value == 0:
-            break
-    return float(high)
-
-
 def nearest_stable_speed(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> float:
     """Tool speed [rad/s] nearest to the present one that is stable at this depth; NaN where none was found.
 
-    Searched outwards in steps of SPEED_STEP up to SPEED_RANGE of the present speed; the feed per tooth
-    or per workpiece revolution does not matter to stability.
+    Searched outwards in steps of SPEED_STEP up to SPEED_RANGE of the present speed; where both sides are
+    stable at the same distance, the one with the smaller spectral radius. delay_model: as in stability_problem.
     """
-    steps = round(SPEED_RANGE / SPEED_STEP)
-    for i in range(1, steps + 1):
+    family = depth_family(op, conditions, conditions.depth, delay_model)
+    series = family.series([conditions.depth])
+    for i in range(1, round(SPEED_RANGE / SPEED_STEP) + 1):
         stable = []
         for sign in (1, -1):
             speed = conditions.tool_speed * (1 + sign * i * SPEED_STEP)
-            if speed > 0:
-                radius, _ = leading(stability_problem(op, replace(conditions, tool_speed=speed), delay_model))
-                if radius < 1:
-                    stable.append((radius, speed))
+            radius = abs(family.multipliers(series, speed)[0])
+            if radius < 1:
+                stable.append((radius, speed))
         if stable:
-            return min(stable)[1]
+            return float(min(stable)[1])
     return NAN
-
-
-def stability_lobes(
-    op: Operation, tool_speeds: Sequence[float] | Floats, depths: Sequence[float] | Floats,
-    workpiece_speed: float | None = None, progress: Callable[[int, int], None] | None = None,
-    delay_model: DelayModel = "mean",
-) -> Lobes:
-    """Stability diagram over tool speeds [rad/s] and depths [m], both ascending.
-
-    workpiece_speed [rad/s] (None: the operation's). progress: called with (done, total) tool speeds.
-    The depth limit is interpolated between the sampled depths on either side of it.
-    Raises ``ValueError`` for values that are not positive, not ascending, or beyond the flute length.
-    """
-    speed, depth = (np.array(v, dtype=np.float64) for v in (tool_speeds, depths))
-    for name, values, unit in (("tool speeds", speed, "rad/s"), ("depths", depth, "m")):
-        ok = values.ndim == 1 and values.size > 0 and np.all(np.isfinite(values)) and values[0] > 0
-        require(bool(ok and np.all(np.diff(values) > 0)), name, values.tolist(), unit, "ascending numbers > 0")
-    radius = np.empty((depth.size, speed.size))
-    kind = np.empty((depth.size, speed.size), dtype=np.uint8)
-    for j, s in enumerate(speed):
-        for i, a in enumerate(depth):
-            conditions = with_cut(op, tool_speed=float(s), workpiece_speed=workpiece_speed, depth=float(a))
-            radius[i, j], kind[i, j] = leading(stability_problem(op, conditions, delay_model))
-        if progress is not None:
-            progress(j + 1, speed.size)
-    used = op.conditions.workpiece_speed if workpiece_speed is None else workpiece_speed
-    return Lobes(used, speed, depth, radius, kind, lowest_limit(depth, radius))
-
-
-def lowest_limit(depths: Floats, spectral_radius: Floats) -> Floats:
-    """Depth [m] at which the spectral radius (m, n) first passes 1 in each column, else the largest of `depths`."""
-    limit = np.full(spectral_radius.shape[1], depths[-1])
-    for j, column in enumerate(spectral_radius.T):
-        unstable = np.flatnonzero(column >= 1)
-        if unstable.size:
-            i = unstable[0]
-            limit[j] = depths[0] if i == 0 else np.interp(1.0, column[i - 1:i + 1], depths[i - 1:i + 1])
-    return limit

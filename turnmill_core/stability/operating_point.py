@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turnmill_core.cutting import engagement as cutting_engagement
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation, Structure, require
+from turnmill_core.stability.collocation import DepthSeries, depth_series, series_multipliers
 from turnmill_core.stability.delay import DELAY_MODELS, DelayModel, delay_variation, mean_delay, tooth_period
 from turnmill_core.stability.problem import Engagement, StabilityProblem
 from turnmill_core.structure.modal import LinearStructure, modal_model, state_space
 
-BAR_SLICES = 24
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+BAR_SLICES = 80
 """Height intervals in which the engagement of a round bar is taken as linear."""
+BAR_SAMPLES = 400
+"""Heights at which it is computed."""
 
 
 def stability_problem(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> StabilityProblem:
@@ -26,27 +34,111 @@ def stability_problem(op: Operation, conditions: Conditions, delay_model: DelayM
     Raises ``ValueError`` for zero engagement, zero tool speed, a depth beyond the flutes, a rigid
     structure, or an unknown delay model.
     """
-    require(delay_model in DELAY_MODELS, "delay model", delay_model, "", f"one of {', '.join(DELAY_MODELS)}")
+    return depth_family(op, conditions, conditions.depth, delay_model).problem(conditions.depth)
+
+
+@dataclass(frozen=True, eq=False)
+class DepthFamily:
+    """The stability problems of one cut at all depths up to a deepest one, else the same.
+
+    op, conditions: where they come from, at the deepest depth; delay_model: as in stability_problem. structure: at the
+    cutting point. below (k,): depths under the surface [m], ascending from 0; start, stop (k, 2): engagement angles
+    there [rad]; kink [m]: depth below which the bar is wider than the cut (0: nowhere).
+    """
+
+    op: Operation
+    conditions: Conditions
+    delay_model: DelayModel
+    structure: LinearStructure
+    below: Floats
+    start: Floats
+    stop: Floats
+    kink: float
+
+    def arcs(self, depths: Sequence[float] | Floats) -> tuple[Floats, Floats, Floats]:
+        """Heights (n, k), start and exit angles (n, k, 2) of the engagement at several depths [m]."""
+        bar = self.op.process == "turn-milling"
+        places = np.stack([_places(float(a), self.kink) if bar else np.array([a, 0.0]) for a in depths])
+        heights = places[:, :1] - places
+        angles = (np.stack([np.interp(places, self.below, v[:, i]) for i in range(2)], axis=-1)
+                  for v in (self.start, self.stop))
+        return heights, *angles
+
+    def problem(self, depth: float, tool_speed: float | None = None) -> StabilityProblem:
+        """The problem at a depth [m] and tool_speed [rad/s] (None: the conditions')."""
+        heights, start, stop = self.arcs([depth])
+        op, conditions = self.op, at_depth(self.op, self.conditions, depth)
+        if tool_speed is not None:
+            conditions = replace(conditions, tool_speed=tool_speed)
+        delays, variation = regeneration(op, conditions, self.delay_model)
+        return StabilityProblem(
+            structure=self.structure, tool_speed=conditions.tool_speed, pitch=tuple(float(p) for p in op.tool.pitch),
+            delays=delays, delay_variation=variation, helix_lag=math.tan(op.tool.helix_angle) / op.tool.radius,
+            coefficients=(op.material.Ktc, op.material.Krc, op.material.Kac),
+            engagement=Engagement(heights[0], start[0], stop[0]))
+
+    def series(self, depths: Sequence[float] | Floats) -> DepthSeries:
+        """The depths prepared for the fast solver."""
+        heights, start, stop = self.arcs(depths)
+        return depth_series(self.problem(float(depths[-1])), heights, start, stop)
+
+    def multipliers(self, series: DepthSeries, tool_speed: float | None = None) -> Complexes:
+        """Leading multipliers of the series at tool_speed [rad/s] (None: the conditions')."""
+        speed = self.conditions.tool_speed if tool_speed is None else tool_speed
+        depths = series.heights[:, -1] if self.delay_model == "first-principles" else series.heights[:1, -1]
+        found = [regeneration(self.op, replace(at_depth(self.op, self.conditions, float(a)), tool_speed=speed),
+                              self.delay_model) for a in depths]
+        variation = np.array([v for _, v in found]) if len(found) > 1 else np.full(len(series.heights), found[0][1])
+        return series_multipliers(series, speed, found[0][0], variation)
+
+
+def depth_family(
+    op: Operation, conditions: Conditions, deepest: float, delay_model: DelayModel = "mean",
+) -> DepthFamily:
+    """The problems of `op` at `conditions` for every depth up to `deepest` [m].
+
+    delay_model and errors: as stability_problem.
+    At a height the arcs depend on the distance from the C axis only, so the deepest cut holds all others.
+    """
     require(conditions.tool_speed > 0, "tool speed", conditions.tool_speed, "rad/s", "a number > 0")
-    tool, pitch = op.tool, op.tool.pitch
-    variation = 0.0
+    require(deepest > 0, "depth", deepest, "m", "a number > 0")
+    require(deepest <= op.tool.flute_length, "depth", deepest, "m",
+            f"at most the flute length {op.tool.flute_length} m")
+    require(conditions.radial_immersion > 0, "radial immersion", conditions.radial_immersion, "m", "a number > 0")
+    require(delay_model in DELAY_MODELS, "delay model", delay_model, "", f"one of {', '.join(DELAY_MODELS)}")
+    cut, kink = at_depth(op, conditions, deepest), 0.0
+    if op.process == "milling":
+        arcs = cutting_engagement.engagement(op, cut, np.zeros(1))
+        below, start, stop = np.array([0.0, deepest]), np.repeat(arcs.start, 2, axis=0), np.repeat(arcs.exit, 2, axis=0)
+    else:
+        kink = min(max(deepest - _narrowing_height(op, cut), 0.0), deepest)
+        below, start, stop = _bar_arcs(op, cut, kink)
+    require(bool(np.any(stop > start)), "engagement", 0.0, "rad", "a tool that cuts")
+    return DepthFamily(op, cut, delay_model, contact_structure(op, cut), below, start, stop, kink)
+
+
+def _places(depth: float, kink: float) -> Floats:
+    """Depths under a bar's surface [m], from `depth` to 0, finer towards the surface; `kink` [m] is one of them."""
+    lower = BAR_SLICES // 4 if 0 < kink < depth else 0
+    upper = kink if lower else depth
+    place = upper * (1 - np.arange(BAR_SLICES - lower + 1) / (BAR_SLICES - lower)) ** 2
+    return np.concatenate([np.linspace(depth, kink, lower + 1)[:-1], place]) if lower else place
+
+
+def regeneration(op: Operation, conditions: Conditions, delay_model: DelayModel) -> tuple[tuple[float, ...], float]:
+    """Mean delay [s] of each tooth and its variation [1] (see StabilityProblem) of `op` at `conditions`.
+
+    delay_model: as in stability_problem.
+    """
+    pitch, variation = op.tool.pitch, 0.0
     if delay_model == "mean":
         delays = mean_delay(pitch, conditions.tool_speed, conditions.workpiece_speed)
     else:
         delays = tooth_period(pitch, conditions.tool_speed)
     if delay_model == "first-principles":
         surface = conditions.workpiece_speed * (conditions.effective_radius + conditions.depth / 2)
-        variation = delay_variation(tool.radius, conditions.tool_speed, surface)
-    return StabilityProblem(
-        structure=contact_structure(op, conditions),
-        tool_speed=conditions.tool_speed,
-        pitch=tuple(float(p) for p in pitch),
-        delays=tuple(float(t) for t in delays),
-        helix_lag=math.tan(tool.helix_angle) / tool.radius,
-        coefficients=(op.material.Ktc, op.material.Krc, op.material.Kac),
-        engagement=engagement_of(op, conditions),
-        delay_variation=variation,
-    )
+        variation = delay_variation(op.tool.radius, conditions.tool_speed, surface)
+    return tuple(float(t) for t in delays), variation
 
 
 def contact_structure(op: Operation, conditions: Conditions) -> LinearStructure:
@@ -62,27 +154,42 @@ def _structure(tool: Structure, workpiece: Structure, rotation: tuple[tuple[floa
     return state_space(modal_model(tool, workpiece, np.array(rotation)))
 
 
-def engagement_of(op: Operation, conditions: Conditions) -> Engagement:
-    """Engagement angles by height; a block has one form at every height, a bar is divided finely near its surface.
-
-    Raises ``ValueError`` where the tool does not cut or the depth exceeds the flute length.
-    """
-    depth = conditions.depth
-    require(depth > 0, "depth", depth, "m", "a number > 0")
-    require(depth <= op.tool.flute_length, "depth", depth, "m", f"at most the flute length {op.tool.flute_length} m")
-    require(conditions.radial_immersion > 0, "radial immersion", conditions.radial_immersion, "m", "a number > 0")
-    slices = BAR_SLICES if op.process == "turn-milling" else 1
-    height = depth * (1 - (1 - np.arange(slices + 1) / slices) ** 2)
-    inside = height.copy()
-    inside[-1] = depth * (1 - 1e-9)  # the material ends at the depth itself
-    arcs = cutting_engagement.engagement(op, conditions, inside)
+def _bar_arcs(op: Operation, deepest: Conditions, kink: float) -> tuple[Floats, Floats, Floats]:
+    """Depths under the surface (k,) [m] and the engagement angles there, start and exit (k, 2) [rad], of a bar."""
+    depth = deepest.depth
+    below = np.unique(np.concatenate([depth * np.linspace(0, 1, BAR_SAMPLES) ** 2, [kink]]))
+    arcs = cutting_engagement.engagement(op, deepest, np.minimum(depth - below, depth * (1 - 1e-9)))
     start, stop = arcs.start.copy(), arcs.exit.copy()
     if np.any(stop[:, 1] > start[:, 1]):
         # one arc past 90 degrees below, two above: split it there, so that both forms join
         whole = (stop[:, 1] <= start[:, 1]) & (start[:, 0] < math.pi / 2) & (stop[:, 0] > math.pi / 2)
         stop[whole, 1], start[whole, 1], stop[whole, 0] = stop[whole, 0], math.pi / 2, math.pi / 2
-    require(bool(np.any(stop > start)), "engagement", 0.0, "rad", "a tool that cuts")
-    return Engagement(height, start, stop)
+    _level_sliver(op, below, start[:, 0], stop[:, 0])
+    return below, start, stop
+
+
+def _level_sliver(op: Operation, below: Floats, start: Floats, stop: Floats) -> None:
+    """Let the flank that a tool enters or leaves along the feed run on to the surface, in place.
+
+    The feed angle turns that flank past x_T = 0, so the last micrometres under the bar's surface end it earlier than
+    the heights below; left in, they would put a bend into the force that is too small to matter and costs nodes.
+    """
+    flank, past = (start, np.abs(start)) if abs(start[-1]) < abs(math.pi - stop[-1]) else (stop, np.abs(math.pi - stop))
+    sliver = (op.tool.radius * math.sin(min(float(past.max()), 0.3))) ** 2 / (2 * op.workpiece.radius)
+    first = int(np.searchsorted(below, 1.2 * sliver))
+    if 0 < first < below.size:
+        other = stop[:first] if flank is start else start[:first]
+        flank[:first] = np.minimum(flank[first], other) if flank is start else np.maximum(flank[first], other)
+
+
+def _narrowing_height(op: Operation, conditions: Conditions) -> float:
+    """Height [m] above which the bar is narrower than the cut, so that its surface ends the arc."""
+    tip = cutting_engagement.engagement(op, conditions, np.zeros(1))
+    widest = cutting_engagement.material_half_width(op, conditions, np.zeros(1))[0]
+    reach = op.tool.radius * max(math.sin(min(abs(v), math.pi / 2)) for v in (tip.start[0, 0], tip.exit[0, 0]))
+    if reach >= widest * (1 - 1e-9):
+        return 0.0
+    return math.sqrt(op.workpiece.radius**2 - reach**2) - conditions.effective_radius
 
 
 def at_depth(op: Operation, conditions: Conditions, depth: float) -> Conditions:

@@ -70,6 +70,10 @@ class StabilityProblem:
     pitch [rad]: angle from tooth j to the tooth j+1 that precedes it, sum 2 pi. delays [s]: mean
     regeneration delay of each tooth. delay_variation [1]: tau_j(phi) = delays_j (1 - delay_variation
     cos phi). helix_lag [rad/m]: 2 tan(helix) / D. coefficients [Pa]: (Ktc, Krc, Kac). engagement.
+    process_damping: (c [N s/m2], friction [1]); the flank resists the velocity v along n with
+    the force c v per depth against n and friction times that along the cut (Eq. 4.70, 4.71). rotating:
+    structure, displacement and force are in the frame (u, v) that turns with the tool (Eq. 4.8), equal to (x, y)
+    at time 0; the past displacement then turns by the tool's motion within the delay.
     """
 
     structure: LinearStructure
@@ -80,6 +84,8 @@ class StabilityProblem:
     coefficients: tuple[float, float, float]
     engagement: Engagement
     delay_variation: float = 0.0
+    process_damping: tuple[float, float] = (0.0, 0.0)
+    rotating: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.tool_speed) and self.tool_speed > 0):
@@ -92,18 +98,26 @@ class StabilityProblem:
             raise ValueError(f"delay variation is {self.delay_variation}, expected a ratio in [0, 1)")
         if not (np.isfinite(self.helix_lag) and np.all(np.isfinite(self.coefficients))):
             raise ValueError("helix lag or a cutting coefficient is not finite, expected finite numbers")
+        if not (np.isfinite(self.process_damping[0]) and self.process_damping[0] >= 0
+                and np.isfinite(self.process_damping[1])):
+            raise ValueError(f"process damping is {self.process_damping} N s/m2, 1, expected a finite coefficient >= 0")
         if self.structure.size == 0:
             raise ValueError("the structure has no modes, expected at least one flexible mode of tool or workpiece")
 
     @property
+    def equal_pitch(self) -> bool:
+        """True where all pitch angles are equal."""
+        return max(self.pitch) - min(self.pitch) < 1e-9
+
+    @property
     def uniform(self) -> bool:
-        """True where all teeth share pitch and delay, so that one tooth period is the principal period."""
-        return max(self.pitch) - min(self.pitch) < 1e-9 and max(self.delays) - min(self.delays) < 1e-12 * self.delays[0]
+        """True where all teeth share pitch and delay."""
+        return self.equal_pitch and max(self.delays) - min(self.delays) < 1e-12 * self.delays[0]
 
     @property
     def period(self) -> float:
-        """Principal period [s]: the tooth period for equal teeth, else the spindle period."""
-        return float((self.pitch[0] if self.uniform else TWO_PI) / self.tool_speed)
+        """Principal period [s]: the tooth period for equal teeth in the fixed frame, else the spindle period."""
+        return float((self.pitch[0] if self.uniform and not self.rotating else TWO_PI) / self.tool_speed)
 
     @property
     def tooth_angles(self) -> Floats:
@@ -129,10 +143,13 @@ def contact_basis(structure: LinearStructure) -> Floats:
     return np.asarray(u[:, :1] * np.sign(u[np.argmax(np.abs(u[:, 0])), 0]), dtype=np.float64)
 
 
-def directional_matrix(problem: StabilityProblem, angle: ArrayLike) -> Floats:
-    """Directional matrix G [N/m] of one tooth whose tip is at `angle` [rad] (k,): array (k, 3, 2).
+def directional_matrix(
+    problem: StabilityProblem, angle: ArrayLike, coefficients: tuple[float, float, float] | None = None,
+) -> Floats:
+    """Directional matrix G [N/m] of one tooth whose tip is at `angle` [rad] (k,): array (k, 3, 2), fixed frame.
 
-    Exact integral over the engaged height for engagement that is linear between its heights.
+    Exact integral over the engaged height for engagement that is linear between its heights. coefficients
+    (Ktc, Krc, Kac): others than the problem's, for instance of process damping.
     """
     tip = np.mod(np.asarray(angle, dtype=np.float64), TWO_PI)
     e, lag = problem.engagement, problem.helix_lag
@@ -150,7 +167,7 @@ def directional_matrix(problem: StabilityProblem, angle: ArrayLike) -> Floats:
             a, b = np.maximum(lo1, lo2), np.minimum(hi1, hi2)
             length = np.maximum(b - a, 0.0) * span
             middle = phi - lag * (low + 0.5 * (a + b) * span)
-            out += _integrated(middle, length, lag, problem.coefficients)
+            out += _integrated(middle, length, lag, coefficients or problem.coefficients)
     return out
 
 
@@ -189,21 +206,38 @@ def kink_angles(problem: StabilityProblem) -> Floats:
     return np.unique(np.mod(angles, TWO_PI))
 
 
-def mean_directional_matrices(problem: StabilityProblem, edges: ArrayLike) -> Floats:
-    """Directional matrix of one tooth averaged over each interval between tip angles `edges` [rad] (k+1,).
+def frame_matrix(angle: ArrayLike) -> Floats:
+    """Matrix T (k, 2, 2) that turns components in the frame of a tool turned by `angle` [rad] (k,) into fixed ones.
 
-    The intervals are split where the matrix is not smooth and each piece is integrated by three
-    Gauss points. Returns (k, 3, 2) [N/m]; edges ascending.
+    The tool turns from +y towards +x: d_fixed = T d_rotating (Eq. 4.8 with this sense).
     """
-    edge = np.asarray(edges, dtype=np.float64)
+    c, s = np.cos(np.atleast_1d(angle)), np.sin(np.atleast_1d(angle))
+    return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=-2)
+
+
+def mean_directional_matrices(
+    problem: StabilityProblem, edges: ArrayLike, tooth_angle: float = 0.0,
+    coefficients: tuple[float, float, float] | None = None,
+) -> Floats:
+    """Directional matrix of one tooth averaged over each interval between tool angles `edges` [rad] (k+1,).
+
+    tooth_angle [rad]: the tip is at the tool angle plus this. In the rotating frame the matrix is turned into it.
+    The intervals are split where the matrix is not smooth and each piece is integrated by three Gauss points. Returns
+    (k, 3, 2) [N/m]; edges ascending. coefficients: as in directional_matrix.
+    """
+    edge = np.asarray(edges, dtype=np.float64) + tooth_angle
     kinks = kink_angles(problem)
     turns = np.arange(np.floor(edge[0] / TWO_PI), np.floor(edge[-1] / TWO_PI) + 1) * TWO_PI
     inside = (kinks[None, :] + turns[:, None]).ravel()
     points = np.unique(np.concatenate([edge, inside[(inside > edge[0]) & (inside < edge[-1])]]))
     x, w = np.polynomial.legendre.leggauss(3)
     width = np.diff(points)
-    gauss = points[:-1, None] + 0.5 * width[:, None] * (1 + x)
-    values = directional_matrix(problem, gauss.ravel()).reshape(width.size, 3, 3, 2)
-    pieces = np.einsum("p,g,pgij->pij", 0.5 * width, w, values)
+    gauss = (points[:-1, None] + 0.5 * width[:, None] * (1 + x)).ravel()
+    values = directional_matrix(problem, gauss, coefficients)
+    if problem.rotating:
+        T = frame_matrix(gauss - tooth_angle)
+        values = values @ T
+        values[:, :2] = T.swapaxes(1, 2) @ values[:, :2]
+    pieces = np.einsum("p,g,pgij->pij", 0.5 * width, w, values.reshape(width.size, 3, 3, 2))
     sums = np.add.reduceat(pieces, np.searchsorted(points, edge[:-1]), axis=0)
-    return sums / np.diff(edge)[:, None, None]
+    return np.asarray(sums / np.diff(edge)[:, None, None], dtype=np.float64)

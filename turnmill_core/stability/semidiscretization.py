@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
+from scipy.sparse.linalg import LinearOperator, eigs
 
-from turnmill_core.stability.problem import StabilityProblem, contact_basis, mean_directional_matrices
+from turnmill_core.stability.problem import StabilityProblem, contact_basis, frame_matrix, mean_directional_matrices
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,56 @@ def period_map(problem: StabilityProblem, steps: int | None = None, order: int =
     how the delayed displacement varies within a step. Raises ``ValueError`` for another order, less
     than two steps, or a delay shorter than a step.
     """
-    k = default_steps(problem) if steps is None else steps
+    grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
+    end, observed = _march(grid, np.eye(grid.size))
+    return PeriodMap(end, problem.period, observed)
+
+
+def leading_multiplier(problem: StabilityProblem, steps: int | None = None, order: int = 1) -> complex:
+    """Multiplier of largest magnitude, Im >= 0, without forming the transition matrix (Arnoldi's method).
+
+    Meant for many steps; arguments and errors as in period_map.
+    """
+    grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
+    start = np.cos(np.arange(grid.size))
+    operator = LinearOperator((grid.size, grid.size), matvec=lambda v: _march(grid, v.reshape(-1, 1))[0].ravel())
+    found = eigs(operator, k=4, v0=start, ncv=min(24, grid.size - 1), return_eigenvectors=False, tol=1e-10)
+    value = found[np.argmax(np.abs(found))]
+    return complex(value.real, abs(value.imag))
+
+
+def extrapolated_radius(problem: StabilityProblem, steps: int) -> tuple[float, float]:
+    """Spectral radius extrapolated from `steps` and twice as many (Richardson, second order), and its estimated error.
+
+    The estimate is what the extrapolation added to the finer result.
+    """
+    coarse, fine = (abs(leading_multiplier(problem, k)) for k in (steps, 2 * steps))
+    return (4 * fine - coarse) / 3, abs(fine - coarse) / 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Everything that the steps of one period need: see period_map and _step_matrices."""
+
+    order: int
+    C: Floats
+    observe: Floats
+    delays: Floats
+    cuts: NDArray[np.bool_]
+    P: Floats
+    Q0: Floats
+    Q1: Floats
+
+    @property
+    def steps_back(self) -> int:
+        return int(np.ceil(self.delays.max())) + 1
+
+    @property
+    def size(self) -> int:
+        return int(self.P.shape[1]) + len(self.C) * self.steps_back
+
+
+def _grid(problem: StabilityProblem, k: int, order: int) -> _Grid:
     if order not in (0, 1):
         raise ValueError(f"order is {order}, expected 0 or 1")
     if k < 2:
@@ -63,35 +113,37 @@ def period_map(problem: StabilityProblem, steps: int | None = None, order: int =
     delays, matrices = _per_step(problem, k)
     if delays.min() < dt:
         raise ValueError(f"delay is {delays.min():.3g} s, expected at least one step of {dt:.3g} s; take more steps")
-    basis = contact_basis(problem.structure)
-    A, B = problem.structure.A, problem.structure.B
-    C = basis.T @ problem.structure.C[:2]
-    gain = B @ matrices @ basis  # (teeth, k, m, r): force of the contact displacement in state space
-    now = gain.sum(axis=0) @ C
-    n, r = A.shape[0], basis.shape[1]
-    steps_back = int(np.ceil(delays.max() / dt)) + 1
-    size = n + r * steps_back
-    x = np.eye(n, size)
-    past = [np.eye(r, size, n + r * i) for i in range(steps_back)]  # past[i] = y at step -1 - i
-    history = [*reversed(past)]  # history[steps_back + i] = y at step i
-    observed = np.empty((k, 3, size))
-    transitions = _step_matrices(A + now, gain, dt)
-    for i in range(k):
-        observed[i] = problem.structure.C @ x
-        history.append(C @ x)
-        P, Q0, Q1 = transitions[0][i], transitions[1][:, i], transitions[2][:, i]
+    basis = np.eye(2) if problem.rotating else contact_basis(problem.structure)
+    A, B, C_xy = problem.structure.A, problem.structure.B, problem.structure.C[:2]
+    now = (B @ matrices.sum(axis=0)) @ C_xy + B @ _process_damping(problem, k)
+    if problem.rotating:  # the past has turned with the tool since
+        turned = frame_matrix(problem.tool_speed * delays.ravel()).reshape(*delays.shape, 2, 2)
+        matrices = matrices @ turned.swapaxes(2, 3)
+    gain = B @ matrices @ basis  # (teeth, k, m, r): force of the past contact displacement in state space
+    cuts = np.any(gain != 0, axis=(2, 3))
+    return _Grid(order, basis.T @ C_xy, problem.structure.C, delays / dt, cuts, *_step_matrices(A + now, gain, dt))
+
+
+def _march(grid: _Grid, start: Floats) -> tuple[Floats, Floats]:
+    """Discrete states `start` (L, columns) one period later, and the displacement (k, 3, columns) on the way."""
+    n, r, back = grid.P.shape[1], len(grid.C), grid.steps_back
+    x = start[:n]
+    # history[back + i] = y at step i; step -1 comes first in the state
+    history = [start[n + r * i:n + r * (i + 1)] for i in reversed(range(back))]
+    observed = np.empty((len(grid.P), 3, start.shape[1]))
+    for i, P in enumerate(grid.P):
+        observed[i] = grid.observe @ x
+        history.append(grid.C @ x)
         x = P @ x
-        for j, tau in enumerate(delays[:, i]):
-            if not np.any(gain[j, i]):
+        for j, tau in enumerate(grid.delays[:, i]):
+            if not grid.cuts[j, i]:
                 continue
-            if order == 0:
-                x = x + Q0[j] @ _interpolated(history, steps_back + i + 0.5 - tau / dt)
+            if grid.order == 0:
+                x = x + grid.Q0[j, i] @ _interpolated(history, back + i + 0.5 - tau)
             else:
-                first = _interpolated(history, steps_back + i - tau / dt)
-                last = _interpolated(history, steps_back + i + 1 - tau / dt)
-                x = x + Q0[j] @ first + Q1[j] @ (last - first)
-    matrix = np.vstack([x, *(history[-1 - i] for i in range(steps_back))])
-    return PeriodMap(matrix, problem.period, observed)
+                first, last = (_interpolated(history, back + i + s - tau) for s in (0, 1))
+                x = x + grid.Q0[j, i] @ first + grid.Q1[j, i] @ (last - first)
+    return np.vstack([x, *(history[-1 - i] for i in range(back))]), observed
 
 
 def _per_step(problem: StabilityProblem, k: int) -> tuple[Floats, Floats]:
@@ -99,11 +151,25 @@ def _per_step(problem: StabilityProblem, k: int) -> tuple[Floats, Floats]:
     edges = problem.tool_speed * problem.period / k * np.arange(k + 1)
     middle = 0.5 * (edges[1:] + edges[:-1]) - 0.5 * problem.helix_lag * problem.engagement.depth
     angles = problem.tooth_angles
-    matrices = np.stack([mean_directional_matrices(problem, edges + angle) for angle in angles])
+    matrices = np.stack([mean_directional_matrices(problem, edges, angle) for angle in angles])
     delays = np.array(problem.delays)[:, None] * (1 - problem.delay_variation * np.cos(middle + angles[:, None]))
     if problem.uniform and problem.delay_variation == 0:
         return delays[:1], matrices.sum(axis=0)[None]
     return delays, matrices
+
+
+def _process_damping(problem: StabilityProblem, k: int) -> Floats:
+    """Force of process damping from the state (k, 3, m), averaged over each step."""
+    c, friction = problem.process_damping
+    A, C = problem.structure.A, problem.structure.C[:2]
+    if c == 0:
+        return np.zeros((k, 3, A.shape[0]))
+    edges = problem.tool_speed * problem.period / k * np.arange(k + 1)
+    G = sum(mean_directional_matrices(problem, edges, angle, (friction * c, c, 0.0)) for angle in problem.tooth_angles)
+    velocity = C @ A
+    if problem.rotating:  # the frame's own motion
+        velocity = velocity + problem.tool_speed * np.array([[0.0, 1.0], [-1.0, 0.0]]) @ C
+    return np.asarray(G @ velocity, dtype=np.float64)
 
 
 def _step_matrices(L: Floats, gain: Floats, dt: float) -> tuple[Floats, Floats, Floats]:

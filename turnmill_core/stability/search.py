@@ -1,0 +1,69 @@
+"""Depth intervals and tool speeds at which a cut is stable."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.stability.collocation import DepthSeries
+from turnmill_core.stability.operating_point import DepthFamily
+
+Floats = NDArray[np.float64]
+
+SCAN_DEPTHS = 20
+"""Depths at which the spectral radius is sampled before its crossings of 1 are refined."""
+
+
+def stable_depths(
+    family: DepthFamily, tool_speed: float | None = None, searched: float | None = None, scan: int = SCAN_DEPTHS,
+    tolerance: float = 1e-4, series: DepthSeries | None = None,
+) -> Floats:
+    """Stable depth intervals (n, 2) [m] in (0, searched]: a scan, then each crossing of |mu| = 1 is refined.
+
+    tool_speed [rad/s] (None: the family's). searched [m]: at most the family's deepest cut, which None means. scan:
+    equally spaced depths; an island thinner than searched / scan may be missed. tolerance: of a crossing, relative to
+    it. series: the scan's depths, where they are at hand. The first interval begins at 0, where the damped structure is
+    stable.
+    """
+    deepest = family.conditions.depth if searched is None else searched
+    series = family.series(np.linspace(0.0, deepest, scan + 1)[1:]) if series is None else series
+    depths = np.concatenate([[0.0], series.heights[:, -1]])
+    excess = np.concatenate([[-1.0], np.log(np.abs(family.multipliers(series, tool_speed)))])
+    edges = [0.0]
+    for i in np.flatnonzero((excess[:-1] < 0) != (excess[1:] < 0)):
+        edges.append(crossing(family, tool_speed, depths[i:i + 2], excess[i:i + 2], tolerance))
+    if excess[-1] < 0:
+        edges.append(deepest)
+    return np.array(edges).reshape(-1, 2)
+
+
+def crossing(
+    family: DepthFamily, tool_speed: float | None, bracket: Floats, excess: Floats, tolerance: float,
+) -> float:
+    """Depth [m] where ln|mu| = 0 between the two depths of `bracket` (2,), at which it is `excess` (2,).
+
+    The secant's guess and a neighbour on either side are solved together and close in on it. tool_speed [rad/s] (None:
+    the family's). tolerance: of the bracket, relative to the depth.
+    """
+    (low, high), (f_low, f_high) = bracket, excess
+    near = 0.03
+    for _ in range(40):
+        width = high - low
+        if width <= tolerance * high:
+            break
+        guess = low + width * min(max(f_low / (f_low - f_high), near), 1 - near)
+        places = np.array([guess - 0.9 * near * width, guess + 0.9 * near * width])
+        found = np.log(np.abs(family.multipliers(family.series(places), tool_speed)))
+        if (f_low < 0) != (found[0] < 0):
+            high, f_high = float(places[0]), float(found[0])
+        elif (found[0] < 0) != (found[1] < 0):
+            low, high, f_low, f_high = float(places[0]), float(places[1]), float(found[0]), float(found[1])
+        else:
+            low, f_low = float(places[1]), float(found[1])
+    return float(low + (high - low) * f_low / (f_low - f_high))
+
+
+def depth_limit(intervals: Floats, depth: float) -> float:
+    """Upper end [m] of the stable interval (n, 2) that holds `depth` [m] or lies next below it; 0 without one."""
+    below = intervals[intervals[:, 0] <= max(depth, 0.0)] if intervals.size else intervals
+    return float(below[-1, 1]) if below.size else 0.0
