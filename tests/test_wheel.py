@@ -37,7 +37,7 @@ def test_the_wheel_holds_code_operations_and_message_texts(project: Path, wheel:
             if "msg_schemas" not in n}
     others = names - wanted - messages - services - code
     assert wanted | messages | services | code <= names
-    assert {Path(n).suffix for n in others} <= {".html", ".css", ".js", ".typed"}, sorted(others)
+    assert {Path(n).suffix for n in others} <= {".html", ".css", ".js", ".typed", ".xml"}, sorted(others)
 
 
 def test_the_wheel_holds_nothing_else(wheel: zipfile.ZipFile) -> None:
