@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from turnmill_core.monitoring.blocks import SensorBlock
+from turnmill_ros.serialized import Extent
 
 
 class BlockCounts:
@@ -17,21 +18,25 @@ class BlockCounts:
 
     def add(self, block: SensorBlock) -> None:
         """Count one block."""
-        self.blocks += 1
-        self.samples += len(block.samples)
-        stream, expected = self._next.get(block.device, (block.stream_id, block.first_sample))
-        if stream != block.stream_id:
-            self.restarts += 1
-            expected = block.first_sample
-        if block.first_sample > expected:
-            self.gaps += 1
-            self.missing_samples += block.first_sample - expected
-        elif block.first_sample < expected:
-            self.repeats += 1
-        self._next[block.device] = (block.stream_id, max(block.end_sample, expected))
+        self.note(Extent(block.device, block.stream_id, block.first_sample, len(block.samples)))
         end = block.stamp_ns + round(len(block.samples) * 1e9 / block.sample_rate)
         self.start_ns = block.stamp_ns if self.start_ns is None else min(self.start_ns, block.stamp_ns)
         self.end_ns = end if self.end_ns is None else max(self.end_ns, end)
+
+    def note(self, extent: Extent) -> None:
+        """Count one block of which only the extent is known."""
+        self.blocks += 1
+        self.samples += extent.samples
+        stream, expected = self._next.get(extent.device, (extent.stream_id, extent.first_sample))
+        if stream != extent.stream_id:
+            self.restarts += 1
+            expected = extent.first_sample
+        if extent.first_sample > expected:
+            self.gaps += 1
+            self.missing_samples += extent.first_sample - expected
+        elif extent.first_sample < expected:
+            self.repeats += 1
+        self._next[extent.device] = (extent.stream_id, max(extent.first_sample + extent.samples, expected))
 
     def values(self) -> dict[str, int]:
         """Counts by name."""

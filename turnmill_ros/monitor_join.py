@@ -35,6 +35,7 @@ from turnmill_ros.predicted import Predictor
 MOST_HELD = 3000
 """Blocks that wait at most; beyond it the oldest is judged with what is known."""
 
+MOST_RECORDED = 20_000
 KEPT_AXES_NS = 2_000_000_000
 SPINDLE = AXES.index("s")
 Judged = tuple[tuple[Verdict, str], ...]
@@ -129,6 +130,8 @@ class MonitorFeed:
             return ()
         self._newest["recorded"] = max(self._newest["recorded"], verdict.window_end_ns)
         self._recorded[verdict.device, verdict.stream_id, verdict.last_sample] = verdict.prior
+        if len(self._recorded) > MOST_RECORDED:  # verdicts of a device that is not judged here
+            del self._recorded[next(iter(self._recorded))]
         return self._pump()
 
     def finish(self) -> Judged:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-import re
-from collections.abc import Collection, Mapping
-from dataclasses import fields, replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
@@ -40,36 +38,28 @@ def _range(kind: Any, low: float | None, high: float | None, number: Any, infini
     return [kind(from_value=number(lower), to_value=number(upper))]
 
 
-def declare_config(
-    node: Node, config: Any, ranges: Mapping[str, tuple[float, float]], skip: Collection[str] = (),
-) -> dict[str, Any]:
-    """Declare a parameter for each field of a configuration value; returns the fields that were set to something else.
+class Setting(NamedTuple):
+    """What a parameter means, with its unit, and its bounds (None: none)."""
 
-    ranges: field -> (low, high); skip: fields that are no parameters. Descriptions come from the docstring of the
-    value's class. Only numbers, truth values and texts become parameters; the value checks itself, so a ValueError
-    names what does not fit.
+    description: str
+    low: float | None = None
+    high: float | None = None
+
+
+def declare_config(node: Node, config: Any, settings: Mapping[str, Setting]) -> dict[str, Any]:
+    """Declare parameters for fields of a configuration value; returns the fields that were set to something else.
+
+    config: its values are the defaults; settings: field -> what it means. A pair of numbers becomes an array. The
+    value checks itself, so a ValueError names what does not fit.
     """
-    told = descriptions(type(config))
     changed = {}
-    for field in fields(config):
-        value = getattr(config, field.name)
-        if field.name not in skip and isinstance(value, bool | int | float | str):
-            low, high = ranges.get(field.name, (None, None))
-            chosen = declare(node, field.name, value, told[field.name], low=low, high=high)
-            if chosen != value:
-                changed[field.name] = chosen
+    for name, (description, low, high) in settings.items():
+        default = getattr(config, name)
+        kept = list(default) if isinstance(default, tuple) else default
+        chosen = declare(node, name, kept, description, low=low, high=high)
+        if isinstance(default, tuple):
+            chosen = tuple(chosen)
+        if chosen != default:
+            changed[name] = chosen
     replace(config, **changed)
     return changed
-
-
-def descriptions(cls: type) -> dict[str, str]:
-    """Meaning of each field of a frozen value, from its class docstring ("name, name [unit]: meaning; name: ...")."""
-    text = " ".join((inspect.getdoc(cls) or "").split())
-    return {field.name: _description(text, field.name) for field in fields(cls)}  # type: ignore[arg-type]
-
-
-def _description(text: str, name: str) -> str:
-    found = re.search(rf"\b{re.escape(name)}\b[^:;.]*:?\s*([^;]*?)(?=;|\.\s|\.$|$)", text)
-    if found is None:
-        return name.replace("_", " ")
-    return found.group(0).strip()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -23,6 +24,10 @@ TRANSITIONS = {
 }
 
 
+MOST_VERDICTS = 1_000_000
+"""Verdicts that are kept, those of the last 14 hours; a recording holds all."""
+
+
 class GraphManager(Node):
     """Listens to what the nodes of a graph say, and asks them to change state."""
 
@@ -30,7 +35,7 @@ class GraphManager(Node):
         super().__init__("graph_manager", **kwargs)
         self._on_verdict = on_verdict
         self.diagnostics = SimpleNamespace(refuse=self.get_logger().warning)
-        self.verdicts: list[Verdict] = []
+        self.verdicts: deque[Verdict] = deque(maxlen=MOST_VERDICTS)
         self.values: dict[str, dict[str, str]] = {}
         self.errors: dict[str, str] = {}
         self._clients_of: dict[str, Any] = {}

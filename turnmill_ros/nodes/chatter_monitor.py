@@ -22,16 +22,31 @@ from turnmill_ros.interfaces import ros_types
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from turnmill_ros.node_table import VERDICT_PLOTS
 from turnmill_ros.nodes import _support as support
-from turnmill_ros.parameters import declare, declare_config
+from turnmill_ros.parameters import Setting, declare, declare_config
 from turnmill_ros.predicted import Predictor
 
-RANGES = {
-    "window": (0.02, 10.0), "revolutions": (1.0, 100.0), "longest_window": (0.02, 60.0), "hop": (0.005, 1.0),
-    "speed_timeout": (0.02, 60.0), "axis_band": (1e-4, 0.1), "nominal_band": (1e-4, 0.1), "gate_ratio": (1.0, 100.0),
-    "enter_ratio": (0.0, 1.0), "leave_ratio": (0.0, 1.0), "enter_dwell": (1, 100), "leave_dwell": (1, 100),
-    "cut_dwell": (1, 100),
+SETTINGS = {
+    "band": Setting("Hz, lower and upper end of the band in which lines are judged"),
+    "window": Setting("s, shortest length of a window", 0.02, 10.0),
+    "revolutions": Setting("tool revolutions, fewest in a window", 1.0, 100.0),
+    "longest_window": Setting("s, longest length of a window", 0.02, 60.0),
+    "hop": Setting("s, from one window to the next", 0.005, 1.0),
+    "device": Setting("device to judge; empty: each one"),
+    "channel": Setting("channel to judge; empty: the first usable"),
+    "fallback": Setting("judge the next usable channel where the chosen one is dead or saturated"),
+    "speed_timeout": Setting("s of stamps, that a window waits for axis states; a longer gap is no axis state",
+                             0.02, 60.0),
+    "axis_band": Setting("1, half width of the search for the speed around that of the axis states", 1e-4, 0.1),
+    "nominal_band": Setting("1, half width of the search for the speed around the nominal one", 1e-4, 0.1),
+    "gate_ratio": Setting("1, level over noise floor that shows a cut", 1.0, 100.0),
+    "enter_ratio": Setting("1, asynchronous over total energy at which chatter begins", 1e-4, 1.0),
+    "leave_ratio": Setting("1, asynchronous over total energy at which chatter ends", 1e-4, 1.0),
+    "enter_dwell": Setting("windows in a row before chatter begins in a cut", 1, 100),
+    "lone_dwell": Setting("windows in a row before chatter begins where only the chatter shows a cut", 1, 100),
+    "leave_dwell": Setting("windows in a row before chatter ends", 1, 100),
+    "cut_dwell": Setting("windows in a row before the state changes between air and cut", 1, 100),
 }
-"""Bounds of the monitor's settings as parameters."""
+"""The monitor's settings that are parameters; its others come from the operation and from `prior` and `axes`."""
 
 
 class ChatterMonitor(LifecycleNode):
@@ -43,13 +58,14 @@ class ChatterMonitor(LifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("chatter_monitor", **kwargs)
-        declared = declare_config(
-            self, ChatterConfig(teeth=1), RANGES, skip=("teeth", "nominal_speed", "equal_pitch", "expect_axes",
-                                                        "recorded_priors"))
+        changes = declare_config(self, ChatterConfig(teeth=1), SETTINGS)
+        floor = declare(self, "noise_floor", 0.0, "rms of the signal out of the cut, its unit; 0: learned", low=0.0)
+        if floor > 0:
+            changes["noise_floor"] = floor
         self._settings = FeedSettings(
             prior=declare(self, "prior", "live", "predictions: live, recorded (of verdicts), computed, none"),
             axes=declare(self, "axes", "live", "axis states: live (wait up to speed_timeout), recorded (wait) or none"),
-            changes=declared)
+            changes=changes)
         self._match, lossless = support.declare_common(self)
         self._feed = MonitorFeed(self._settings)
         self._sent = 0

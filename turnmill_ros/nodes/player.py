@@ -18,7 +18,7 @@ from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import declare
-from turnmill_ros.restamp import shifted
+from turnmill_ros.serialized import shifted
 from turnmill_ros.topics import Topic
 
 CLOCK_PERIOD_NS = 10_000_000

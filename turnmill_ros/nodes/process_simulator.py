@@ -16,7 +16,19 @@ from turnmill_ros.conversions import axes_from_message, block_to_message
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.operation_track import OperationTrack
-from turnmill_ros.parameters import declare
+from turnmill_ros.parameters import Setting, declare, declare_config
+
+SETTINGS = {
+    "sample_rate": Setting("Hz, of every channel", 1000, 204800),
+    "channels": Setting("names of the channels to measure"),
+    "oversampling": Setting("integration steps for each sample; 0: enough for 100 kHz", 0, 64),
+    "slices": Setting("slices along the tool axis; 0: chosen by the helix", 0, 256),
+    "block_duration": Setting("s, length of a block", 0.01, 0.05),
+    "displacement_noise": Setting("m, rms of white noise on displacements", 0.0, 1e-3),
+    "force_noise": Setting("N, rms of white noise on forces", 0.0, 1e3),
+    "device": Setting("name of the acquisition device"),
+}
+"""The simulation's settings that are parameters."""
 
 
 class ProcessSimulator(LifecycleNode):
@@ -25,11 +37,7 @@ class ProcessSimulator(LifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("process_simulator", **kwargs)
         default = SimulationConfig(sample_rate=51200)
-        self._config = SimulationConfig(
-            sample_rate=declare(self, "sample_rate", default.sample_rate, "Hz", low=1000, high=204800),
-            channels=tuple(declare(self, "channels", list(default.channels), "names of the channels to measure")),
-            block_duration=declare(self, "block_duration", default.block_duration, "s", low=0.01, high=0.05),
-            device=declare(self, "device", default.device, "name of the acquisition device"))
+        self._config = replace(default, **declare_config(self, default, SETTINGS))
         self._seed = declare(self, "seed", 0, "seed of all noise", low=0)
         self._allowed = declare(self, "allowed_lag", 0.25, "s, lag behind the axis states that is a warning", low=0.05)
         self._match, lossless = support.declare_common(self)

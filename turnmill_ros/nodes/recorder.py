@@ -12,10 +12,12 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState
 
 from turnmill_ros import topics
 from turnmill_ros.bag import BagWriter
+from turnmill_ros.block_counts import BlockCounts
 from turnmill_ros.errors import RecordingError
 from turnmill_ros.node_table import KINDS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import declare
+from turnmill_ros.serialized import extent
 from turnmill_ros.topics import Topic
 
 
@@ -33,9 +35,10 @@ class Recorder(LifecycleNode):
                                low=0.0, high=60.0)
         self._match, _ = support.declare_common(self)
         self._counts: Counter[str] = Counter()
+        self._blocks = BlockCounts()
         self._waiting: list[tuple[Topic, bytes]] = []
         self._writer: BagWriter | None = None
-        self.diagnostics = support.Diagnostics(self, self._values)
+        self.diagnostics = support.Diagnostics(self, self._values, self._blocks.trouble)
         self.create_timer(0.5, self._flush, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @support.transition
@@ -71,6 +74,8 @@ class Recorder(LifecycleNode):
         """Write one serialized message."""
         now = self.get_clock().now().nanoseconds
         self._waiting.append((topic, data))
+        if topic is topics.SENSOR_BLOCKS:
+            self._blocks.note(extent(data))
         if now > 0:  # before the first /clock of a replay there is no time yet
             self._attempt(lambda: self._write(now))
 
@@ -109,6 +114,7 @@ class Recorder(LifecycleNode):
     def _values(self) -> dict[str, object]:
         return {"bag": self._bag, "messages": sum(self._counts.values()),
                 "sensor_blocks_recorded": self._counts[topics.SENSOR_BLOCKS.name],
+                **{f"received_{name}": count for name, count in self._blocks.values().items()},
                 **{f"recorded {name}": count for name, count in sorted(self._counts.items())}}
 
 

@@ -1,14 +1,19 @@
-"""Shifting serialized messages, held against decoding and encoding them."""
+"""Reading and changing serialized messages, held against decoding and encoding them."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.bag_cases import TYPES, axes, block
+from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_ros.conversions import axes_to_message, block_from_message, block_to_message
 from turnmill_ros.interfaces import typestore
-from turnmill_ros.restamp import shifted
+from turnmill_ros.serialized import extent, shifted
 
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 BLOCK = "turnmill_msgs/msg/SensorBlock"
 
 
@@ -34,3 +39,20 @@ def test_big_endian_data_is_refused() -> None:
     data = bytes(typestore().serialize_cdr(block_to_message(block(0), TYPES), BLOCK, little_endian=False))
     with pytest.raises(ValueError, match="little-endian"):
         shifted(data, 1)
+
+
+@given(TEXT, st.lists(st.tuples(TEXT, TEXT, TEXT, TEXT), min_size=1, max_size=5), st.integers(0, 2**32 - 1),
+       st.integers(0, 2**63), st.integers(0, 7))
+def test_the_extent_of_a_block(
+    device: str, channels: list[tuple[str, str, str, str]], stream: int, first: int, count: int,
+) -> None:
+    made = SensorBlock(5, device, stream, first, 6400.0, tuple(Channel(*texts) for texts in channels),
+                       np.zeros((count, len(channels)), np.float32))
+    data = bytes(typestore().serialize_cdr(block_to_message(made, TYPES), BLOCK))
+    assert extent(data) == (device, stream, first, count)
+
+
+@pytest.mark.parametrize("data", [b"", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 60, b"\0\1\0\0" + bytes(60)])
+def test_what_is_no_block_has_no_extent(data: bytes) -> None:
+    with pytest.raises(ValueError, match="not a serialized sensor block"):
+        extent(data)
