@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,7 @@ def test_merge_is_contiguous_and_counts_all() -> None:
     segments = merge([verdict(k, s, 800.0 + k) for k, s in enumerate(states)])
     assert [s.state for s in segments] == [ChatterKind.AIR, ChatterKind.HOPF, ChatterKind.AIR]
     assert sum(s.verdicts for s in segments) == len(states)
-    assert all(a.end_ns == b.start_ns for a, b in zip(segments, segments[1:], strict=False))
+    assert all(a.end_ns == b.start_ns for a, b in pairwise(segments))
     assert segments[1].start_ns == 1_000_000_000 + 3 * HOP
     assert segments[1].chatter_frequency == 803.5
 
@@ -54,7 +55,8 @@ def test_json_is_complete_and_plain() -> None:
     found = json.loads(json.dumps(plain(analysis_json(analysis)), allow_nan=False))
     assert found["start_time"].endswith("Z")
     assert len(found["verdicts"]) == found["summary"]["verdict_count"]
-    assert {"t_start_s", "t_end_s", "state", "reason", "chatter_frequency_hz", "confidence"} <= found["verdicts"][0].keys()
+    keys = {"t_start_s", "t_end_s", "state", "reason", "chatter_frequency_hz", "confidence"}
+    assert keys <= found["verdicts"][0].keys()
     assert found["segments"][-1]["state"] == "FLIP"
     assert sum(found["summary"]["durations_s"].values()) == pytest.approx(found["segments"][-1]["t_end_s"], abs=0.01)
 

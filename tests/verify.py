@@ -36,8 +36,7 @@ def tables() -> str:
         rows = module.rows()
         parts.append(f"\n## {file.stem.removeprefix('rows_').capitalize()}\n\n{(module.__doc__ or '').strip()}\n")
         parts.append("| quantity | source | published | computed | unit | why |\n|---|---|---|---|---|---|")
-        parts += [f"| {' | '.join(shown(value) for value in (r.quantity, r.source, r.published, r.computed, r.unit, r.why))} |"
-                  for r in rows]
+        parts += [f"| {' | '.join(map(shown, row))} |" for row in rows]
     return "\n".join(parts) + "\n"
 
 
