@@ -25,16 +25,16 @@ class Predictions:
     def plots(self, start_ns: int, x_range: Range1d) -> list[Any]:
         """Figures over time; none where the bag holds no predictions."""
         made = []
+        if self.margins:
+            time = [(s - start_ns) * 1e-9 for s, _, _ in self.margins]
+            made.append(figures.lines_over_time("Depth of cut and its predicted limit", "depth [mm]", time, {
+                "depth": [d for _, d, _ in self.margins], "limit": [m for _, _, m in self.margins]}, x_range))
         if self.loads:
             time = [(s - start_ns) * 1e-9 for s, _, _ in self.loads]
             for what, unit, k in (("force on the tool", "N", 1), ("torque on the tool spindle", "N m", 2)):
                 named = {f"mean {what.split()[0]}": [load[k] for load in self.loads]}
                 made.append(figures.lines_over_time(f"Predicted mean {what}", f"{what.split()[0]} [{unit}]", time,
                                                     named, x_range))
-        if self.margins:
-            time = [(s - start_ns) * 1e-9 for s, _, _ in self.margins]
-            made.append(figures.lines_over_time("Depth of cut and its predicted limit", "depth [mm]", time, {
-                "depth": [d for _, d, _ in self.margins], "limit": [m for _, _, m in self.margins]}, x_range))
         return made
 
 
