@@ -17,7 +17,8 @@ def random_problem(seed: int) -> StabilityProblem:
         shape = rng.standard_normal(3) * [1, 1, 0.3] if rng.random() < 0.4 else np.eye(3)[rng.integers(0, 2)]
         frequency = 10 ** rng.uniform(2.4, 3.3)
         stiffness = 10 ** rng.uniform(6.3, 7.8)
-        modes.append(Mode(frequency, 10 ** rng.uniform(-2.2, -1.2), stiffness / (2 * np.pi * frequency) ** 2, tuple(shape)))
+        mass = stiffness / (2 * np.pi * frequency) ** 2
+        modes.append(Mode(frequency, 10 ** rng.uniform(-2.2, -1.2), mass, tuple(shape)))
     split = int(rng.integers(0, len(modes) + 1))
     structure = state_space(modal_model(Structure(tuple(modes[:split])), Structure(tuple(modes[split:]), "tool")))
     teeth = int(rng.integers(1, 7))
@@ -39,7 +40,8 @@ def random_problem(seed: int) -> StabilityProblem:
     engagement = constant_engagement(depth, start, stop)
     if rng.random() < 0.3:
         height = depth * (1 - (1 - np.linspace(0, 1, 17)) ** 2)
-        engagement = Engagement(height, np.full(17, start), start + (stop - start) * np.sqrt(1 - height / depth * 0.999))
+        taper = np.sqrt(1 - height / depth * 0.999)
+        engagement = Engagement(height, np.full(17, start), start + (stop - start) * taper)
     return StabilityProblem(
         structure, speed, tuple(pitch), tuple(pitch / speed * stretch), float(lag), coefficients, engagement,
         delay_variation=float(rng.choice([0.0, 0.0, 0.0, rng.uniform(0.005, 0.05)])))
