@@ -20,7 +20,7 @@ from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.topics import Topic
 
-MATCH_DEADLINE_S = 20.0
+MATCH_DEADLINE_S = 60.0
 ACTIVE = "active"
 
 
@@ -124,7 +124,7 @@ def wait_until_matched(node: Node, expected: Iterable[str]) -> None:
     """Wait until each "topic=count" of `expected` holds for the node's publisher or subscription of that name.
 
     A source that sees all its subscribers, and subscribers that see their publisher, lose no first
-    message. Raises InputError after 20 s, naming what is missing.
+    message. Raises InputError after MATCH_DEADLINE_S, naming what is missing.
     """
     end = time.monotonic() + MATCH_DEADLINE_S
     missing = _unmatched(node, expected)
