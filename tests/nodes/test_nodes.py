@@ -26,6 +26,7 @@ from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.stability.margin import stability_margin
 from turnmill_ros import topics
+from turnmill_ros.bag import bag_info
 from turnmill_ros.conversions import (
     axes_from_message,
     axes_to_message,
@@ -267,6 +268,16 @@ def test_the_player_plays_inputs_only_again_and_again_with_its_clock(probe: Prob
     assert clock == sorted(clock)
     assert len(clock) > 3
     assert len(probe.heard["operation"]) == 3
+
+
+def test_an_operation_that_only_the_metadata_hold_is_published(probe: Probe, tmp_path: Path) -> None:
+    path = write(tmp_path / "in.mcap", [block(k) for k in range(3)], with_operation=False)
+    probe.listen(topics.OPERATION)
+    player = probe.add(Player, bag=str(path))
+    player.trigger_configure()
+    heard = probe.heard["operation"]
+    assert probe.until(lambda: len(heard) == 1)
+    assert heard[0].sha256 == bag_info(path).metadata["operation"]["sha256"]
 
 
 def test_a_recording_that_cannot_be_played_is_refused(probe: Probe, tmp_path: Path) -> None:

@@ -13,9 +13,10 @@ from rclpy.publisher import Publisher
 
 from turnmill_ros import topics
 from turnmill_ros.bag import bag_info, raw_messages
-from turnmill_ros.conversions import clock_to_message
+from turnmill_ros.conversions import clock_to_message, operation_to_message
 from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
+from turnmill_ros.monitor_feed import recorded_operation
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import declare
 from turnmill_ros.serialized import shifted
@@ -63,12 +64,13 @@ class Player(LifecycleNode):
             else:
                 self._out[found.name] = topic, support.publisher(
                     self, topic, name=topics.recorded_name(topic.name.strip("/")), keep_all=True)
-        if topics.OPERATION.name in self._out:
+        if topics.OPERATION.name in self._out:  # monitors are configured for an operation: it goes ahead of the rest
+            operation = recorded_operation(Path(self._bag), info)
             names = [found.name for found in info.topics if topics.find(found.name) is topics.OPERATION]
             first = next(raw_messages(self._bag, names), None) if names else None
-            if first is not None:  # monitors are configured for an operation, so it comes ahead of the rest
-                self._announced = first.data
-                support.send(self._out[first.topic][1], first.data)
+            self._announced = first.data if first is not None else None
+            support.send(self._out[topics.OPERATION.name][1], self._announced or operation_to_message(
+                operation, info.start_ns or 0, ros_types()))
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:
