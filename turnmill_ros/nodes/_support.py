@@ -48,7 +48,7 @@ PARENT_VARIABLE = "TURNMILL_PARENT"
 """Environment variable with the process id of the graph; a node ends when that process is gone."""
 
 GATHER_S = 0.008
-"""Pause between wakes of a process: what arrives meanwhile is handled at once, at half the cost (measured at 250 Hz)."""
+"""Pause between wakes of a process: what arrives meanwhile is handled at once, at half the cost at 250 Hz."""
 
 Transition = Callable[[Any, LifecycleState], TransitionCallbackReturn]
 
@@ -67,7 +67,10 @@ def accept_operation(accept: Callable[[int, Operation], Any], message: Any) -> A
 
 
 def wait_for_operation(node: Any, operations: OperationTrack) -> Operation:
-    """The operation that holds first, which a latched message brings. Raises InputError after MATCH_DEADLINE_S without one."""
+    """The operation that holds first, which a latched message brings.
+
+    Raises InputError after MATCH_DEADLINE_S without one.
+    """
     end = time.monotonic() + MATCH_DEADLINE_S
     while operations.first is None:
         if time.monotonic() > end:
