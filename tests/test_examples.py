@@ -26,5 +26,5 @@ def test_forces_and_stability() -> None:
 def test_analyze_folder() -> None:
     text = output("examples/analyze_folder.py", "bags")
     demo = next(line for line in text.splitlines() if line.startswith("demo_turn_milling"))
-    assert "chatter at 8" in demo
+    assert "chatter at 778" in demo
     assert "truncated" in text
