@@ -66,6 +66,6 @@ def test_replay(launched: Any, tmp_path: Path) -> None:
     bag = write(tmp_path / "in.mcap", [block(k) for k in range(3)])
     nodes = by_name(launched("replay.launch.py", recording=str(bag), rate="0"))
     assert nodes.keys() == {"player", "force_predictor", "stability_monitor", "chatter_monitor"}
-    assert nodes["chatter_monitor"].parameters[0]["prior"] == "none"
+    assert nodes["chatter_monitor"].parameters[0]["prior"] == "computed"
     assert nodes["chatter_monitor"].parameters[0]["axes"] == "recorded"
     assert nodes["player"].parameters[0]["rate"] == 0.0
