@@ -19,7 +19,7 @@ from turnmill_ros.conversions import (
     verdict_to_message,
 )
 from turnmill_ros.interfaces import ros_types
-from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
+from turnmill_ros.monitor_join import FeedSettings, MonitorFeed, end_ns
 from turnmill_ros.node_table import VERDICT_PLOTS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import Setting, declare, declare_config
@@ -68,7 +68,7 @@ class ChatterMonitor(LifecycleNode):
             changes=changes)
         self._match, lossless = support.declare_common(self)
         self._feed = MonitorFeed(self._settings)
-        self._sent = 0
+        self._sent, self._lag = 0, 0.0
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.CHATTER_STATE, *VERDICT_PLOTS)}
         self.diagnostics = support.Diagnostics(self, self._values, self._warning)
@@ -114,7 +114,9 @@ class ChatterMonitor(LifecycleNode):
 
     def on_block(self, message: Any) -> None:
         """Take a block of samples."""
-        self._publish(self._feed.block(block_from_message(message)))
+        block = block_from_message(message)
+        self._publish(self._feed.block(block))
+        self._lag = (self.get_clock().now().nanoseconds - end_ns(block)) * 1e-9
 
     def on_margin(self, message: Any) -> None:
         """Take a prediction."""
@@ -139,7 +141,7 @@ class ChatterMonitor(LifecycleNode):
     def _values(self) -> dict[str, object]:
         counts = {f"received_{name}": count for name, count in self._feed.counts.values().items()}
         return {**counts, "blocks_judged": self._feed.judged, "blocks_dropped": self._feed.dropped,
-                "verdicts_sent": self._sent}
+                "verdicts_sent": self._sent, "lag_s": f"{self._lag:.3f}"}
 
 
 if __name__ == "__main__":
