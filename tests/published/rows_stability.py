@@ -76,7 +76,8 @@ def delays() -> list[Row]:
     slow, fast = (mean_delay(pair, 3350 * RPM, w * RPM)[0] for w in (6, 21))
     return [
         Row("delay at 6000 and 3000 rpm", "Figure 4.28", "7.48 to 7.51",
-            mean_delay(pair, 6000 * RPM, 3000 * RPM)[0] * 1e3, "ms", "erratum D1: two teeth, not Table 4.3's four; the mean is Td (1 + 1/2)"),
+            mean_delay(pair, 6000 * RPM, 3000 * RPM)[0] * 1e3, "ms",
+            "erratum D1: two teeth, not Table 4.3's four; the mean is Td (1 + 1/2)"),
         Row("change of the delay, 6 to 21 rpm", "section 4.3.7.3", 4.0, (fast / slow - 1) * 100, "%",
             "erratum D2: not what Eq. 4.88 gives"),
     ]
@@ -103,7 +104,7 @@ def asymmetric_cutter() -> list[Row]:
     """Section 4.2.3, point A of Figure 4.7."""
     spindle, tooth, at = 16245 / 60, 2 * 16245 / 60, "Figure 4.7, point A"
     dominant = asymmetric_verdict(True).chatter_frequency - spindle
-    why = "line in the tool's frame minus the spindle frequency; Coriolis as printed, tool-fixed damping, no helix"
+    why = "line in the tool's frame minus the spindle's; Coriolis as printed, tool-fixed damping, no helix"
     return [
         *(Row(f"chatter line {q:+d}", at, published, dominant + q * tooth, "Hz", why)
           for q, published in ((-1, 2509), (0, 3052), (1, 3592))),
@@ -160,5 +161,6 @@ def low_speed() -> list[Row]:
             "erratum D5: the text's numbers do not return its own two tests"),
         Row("asymptotic speed of the envelope", at, 1147, found.asymptotic_speed / RPM, "rpm", "erratum D5"),
         Row("contact length of the flank", at, "0.028 m",
-            flank_contact_length(60e-6, math.radians(50), math.radians(5)) * 1e6, "um", "erratum D6: Eq. 4.72 with 60 um, 50 and 5 degrees"),
+            flank_contact_length(60e-6, math.radians(50), math.radians(5)) * 1e6, "um",
+            "erratum D6: Eq. 4.72 with 60 um, 50 and 5 degrees"),
     ]

@@ -178,12 +178,16 @@ def _shift(problem: StabilityProblem) -> float:
 
 
 def solve(problem: StabilityProblem, tolerance: float = 3e-5) -> FloquetVerdict:
-    """Verdict of one problem, with more nodes until the spectral radius is good to `tolerance` by its own estimate."""
+    """Verdict of one problem, with more nodes until the spectral radius is good to `tolerance` by its own estimate.
+
+    tolerance: relative where the radius is above 1, at least TOLERANCE.
+    """
     error = np.inf
     for base_nodes in REFINEMENTS:
         found = period_map(problem, base_nodes, _probes(problem))
         result = verdict_from_map(found.matrix, found.displacement, found.period)
-        error = abs(result.spectral_radius - abs(leading_multiplier(problem, base_nodes + FINER)))
+        finer = abs(leading_multiplier(problem, base_nodes + FINER))
+        error = max(abs(result.spectral_radius - finer), TOLERANCE * max(1.0, finer))
         if error < tolerance * max(1.0, result.spectral_radius):
             break
     return replace(result, error=error)
