@@ -46,7 +46,7 @@ class ChatterConfig:
     channel: str = ""
     fallback: bool = False
     expect_axes: bool = True
-    speed_timeout: float = 0.5
+    speed_timeout: float = 2.0
     axis_band: float = 0.002
     nominal_band: float = 0.02
     recorded_priors: bool = False
