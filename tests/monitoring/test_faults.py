@@ -138,7 +138,7 @@ def test_clock_step() -> None:
 
 
 def test_without_axis_states_the_nominal_speed_is_used_after_the_timeout() -> None:
-    config = replace(CONFIG, expect_axes=True)
+    config = replace(CONFIG, expect_axes=True, speed_timeout=0.5)
     state, early = initial(config), []
     for b in blocks(cut()):
         state, verdicts = update(config, state, b)
