@@ -104,6 +104,17 @@ def test_runout_of_more_teeth_is_no_chatter(teeth: int) -> None:
     assert states(judged(x, teeth, 3350 * RPM)) == {ChatterKind.STABLE}
 
 
+def test_variable_pitch_has_families_at_the_spindle_frequency() -> None:
+    t = phase(3350 * RPM, 1.5)
+    x = comb(t, 4, runout=0.5) + hopf(t, 1, 871.3, 0.6) + noise(len(t), 0.05, 3)
+    verdicts = settled(judged(x, 4, 3350 * RPM, equal_pitch=False))
+    assert {v.state for v in verdicts} == {ChatterKind.HOPF}
+    assert verdicts[-1].tooth_passing_frequency == pytest.approx(4 * 3350 / 60, rel=1e-3)
+    assert np.diff(verdicts[-1].chatter_family)[:2] == pytest.approx(3350 / 60, rel=0.02)
+    assert states(judged(comb(t, 4, runout=0.5) + noise(len(t), 0.05, 3), 4, 3350 * RPM,
+                         equal_pitch=False)) == {ChatterKind.STABLE}
+
+
 def test_resonance_of_a_tooth_harmonic_is_no_chatter() -> None:
     t = phase(3350 * RPM, 2.0)
     x = comb(t, 4) + 4 * np.cos(2 * math.pi * 16 * t) + noise(len(t), 0.1, 3)

@@ -29,9 +29,9 @@ class ChatterConfig:
     learned). gate_ratio: level over floor that shows a cut.
     enter_ratio, leave_ratio: asynchronous (or half-order) energy over total energy at which chatter
     begins and ends; an amplitude of 20 % of the synchronous one is an energy of 0.04.
-    enter_dwell, lone_dwell, leave_dwell, cut_dwell: windows in a row that must agree before chatter
-    begins in a cut that the tooth passing comb shows, before it begins without that comb, before it
-    ends, and before the state changes between air and cut.
+    enter_dwell, lone_dwell, leave_dwell, marginal_dwell, cut_dwell: windows in a row that must agree before chatter
+    begins in a cut, before it begins where nothing but the chatter shows a cut, before it ends,
+    before the cut is called marginal, and before the state changes between air and cut.
     """
 
     teeth: int
@@ -57,6 +57,7 @@ class ChatterConfig:
     enter_dwell: int = 2
     lone_dwell: int = 8
     leave_dwell: int = 2
+    marginal_dwell: int = 3
     cut_dwell: int = 2
 
     def __post_init__(self) -> None:
@@ -77,13 +78,18 @@ class ChatterConfig:
         require(self.gate_ratio > 1, "gate ratio", self.gate_ratio, "", "a number > 1")
         require(self.noise_floor is None or self.noise_floor > 0, "noise floor", self.noise_floor, "channel unit",
                 "a number > 0")
-        for name in ("enter_dwell", "lone_dwell", "leave_dwell", "cut_dwell"):
+        for name in ("enter_dwell", "lone_dwell", "leave_dwell", "marginal_dwell", "cut_dwell"):
             require(getattr(self, name) >= 1, name.replace("_", " "), getattr(self, name), "windows", "an integer >= 1")
 
     @property
+    def principal_teeth(self) -> int:
+        """Equal parts of a revolution: the teeth at equal pitch, else 1 (then all families repeat with the spindle)."""
+        return self.teeth if self.equal_pitch else 1
+
+    @property
     def odd(self) -> bool:
-        """True where half the tooth passing frequency is no multiple of the spindle frequency."""
-        return self.teeth % 2 == 1
+        """True where half the principal frequency is no multiple of the spindle frequency."""
+        return self.principal_teeth % 2 == 1
 
 
 def config_from_operation(op: Operation) -> ChatterConfig:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from turnmill_core.monitoring.confidence import confidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
 from turnmill_core.monitoring.gate import Background, plain_comb
@@ -14,6 +13,9 @@ from turnmill_core.prediction import PredictedType, Prior
 
 TRANSIENT = math.log(2.0)
 """A change of the synchronous amplitude between the halves of a window, up or down, that shows entry or exit."""
+
+WARNING = 0.5
+"""A family that will pass the enter threshold in less than this [s] makes the cut marginal."""
 
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
@@ -30,37 +32,44 @@ class Judgement:
     text: str
     asynchronous_ratio: float = math.nan
     half_order_ratio: float = math.nan
-    confidence: float = 0.0
 
 
 def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, chattering: bool,
-          prior: Prior | None) -> Judgement:
-    """State of a window from its features; chattering: the leave thresholds apply instead of the enter thresholds."""
-    own = [x for x in f.lines if x.energy > 4 * background.line_energy(x)]
+          prior: Prior | None, warning: float = math.inf) -> Judgement:
+    """State of a window from its features.
+
+    chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
+    growing family will pass the enter threshold.
+    """
+    own = [x for x in f.lines if x.energy > 4 * background.line_energy(x.frequency)]
     asynchronous = sum(x.energy for x in own)
     total = asynchronous + f.synchronous + (f.half.energy if config.odd else 0.0)
     ratio = asynchronous / total if total > 0 else 0.0
-    half = min(1.0, f.half.energy / f.synchronous) if f.synchronous > 0 else 0.0
+    before = 2 * sum(background.line_energy(x) for x in f.half.members)
+    half = min(1.0, max(0.0, f.half.energy - before) / f.synchronous) if f.synchronous > 0 else 0.0
     if not cut:
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
-                         ratio, half, confidence(f, ratio, half))
+                         ratio, half)
     kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior)
+    if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
+        kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
+        text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
     if not chattering and kind is not ChatterKind.STABLE and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT:
         kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
         text = f"entry or exit: the tooth passing harmonics change {f.change:.2g}-fold within the window; else {text}"
-    return Judgement(kind, reason, text, ratio, half, confidence(f, ratio, half))
+    return Judgement(kind, reason, text, ratio, half)
 
 
 def _cut(config: ChatterConfig, f: Features, background: Background, ratio: float, half: float,
          chattering: bool, prior: Prior | None) -> tuple[ChatterKind, Reason, str]:
     threshold = config.leave_ratio if chattering else config.enter_ratio
     c = f.chatter
-    if c is not None and f.lines[0].energy > 4 * background.line_energy(f.lines[0]):
+    if c is not None and f.lines[0].energy > 4 * background.line_energy(f.lines[0].frequency):
         share = c.energy / (c.energy + f.synchronous)
         evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
         if evident and share > threshold:
             return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
-                    f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.teeth:.1f} Hz hold "
+                    f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.principal_teeth:.1f} Hz hold "
                     f"{100 * share:.0f} % of the energy")
         if evident and share > config.leave_ratio:
             return (ChatterKind.MARGINAL, Reason.ASYNCHRONOUS,
@@ -104,8 +113,8 @@ class Held:
 def persist(config: ChatterConfig, held: Held, kind: ChatterKind, plain: bool) -> Held:
     """Held state after a window judged `kind`: a change needs its dwell of windows in a row that agree.
 
-    Chatter must last longer where no plain comb shows the cut by itself (lone_dwell): entry into the cut
-    and other passing machine sounds can look like a family for some tenths of a second.
+    Chatter must last longer where nothing else showed the cut (lone_dwell), neither a plain comb now nor a
+    cut before it: machine sounds out of the cut can look like a family for some tenths of a second.
     """
     if kind == held.kind:
         return Held(kind, kind, 0)
@@ -119,9 +128,9 @@ def persist(config: ChatterConfig, held: Held, kind: ChatterKind, plain: bool) -
 
 def _dwell(config: ChatterConfig, old: ChatterKind, new: ChatterKind, plain: bool) -> int:
     if new in CHATTER:
-        return config.enter_dwell if plain or old in CHATTER else config.lone_dwell
+        return config.lone_dwell if not plain and old in (ChatterKind.AIR, ChatterKind.UNKNOWN) else config.enter_dwell
     if old in CHATTER:
         return config.leave_dwell
     if ChatterKind.AIR in (old, new) and old is not ChatterKind.UNKNOWN:
         return config.cut_dwell
-    return 1
+    return config.marginal_dwell if new is ChatterKind.MARGINAL else 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,10 @@ LARGEST_RAMP = 0.01
 """Largest relative change of the speed over a window that is followed by the signal alone."""
 
 
+TURNING = 0.008
+"""A line that turns faster than this against the tool [revolutions of phase per revolution] is asynchronous."""
+
+
 @dataclass(frozen=True)
 class ChatterFamily:
     """Lines at H + i f_tooth.
@@ -58,7 +62,10 @@ class ChatterFamily:
 
 @dataclass(frozen=True)
 class HalfOrder:
-    """Lines at odd multiples of half the tooth passing frequency: energy, strongest and all lines [Hz]."""
+    """Lines at odd multiples of half the tooth passing frequency.
+
+    energy: mean square of all; frequency [Hz]: the strongest; members [Hz], ascending: all above the noise.
+    """
 
     energy: float
     frequency: float = math.nan
@@ -70,7 +77,8 @@ class Features:
     """Energies are mean squares over the window (Hann-squared weights), above noise.
 
     frequency: spindle frequency [Hz]; speed_ratio: refined over assumed speed; tooth: energy at
-    tooth passing harmonics; synchronous: at all spindle harmonics; half: half-order lines; comb:
+    tooth passing harmonics; synchronous: at all spindle harmonics; once: at the first of
+    them; half: half-order lines; comb:
     number of tooth passing harmonics above the noise, of comb_of looked at; noise: broadband
     energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
     second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
@@ -81,6 +89,7 @@ class Features:
     speed_ratio: float
     tooth: float
     synchronous: float
+    once: float
     half: HalfOrder
     comb: int
     comb_of: int
@@ -115,8 +124,11 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     inside = (order * layout.frequency >= min(lowest, 0.4 * tooth_frequency)) & (order * layout.frequency <= p.top)
     clear = np.where(inside & (energy > 4 * noise), energy - noise, 0.0)
     tooth = order % teeth == 0
+    turning, moved = _turning(parts, clear, noise, tooth, lowest)
+    clear = np.where(moved, 0.0, clear)
     first = np.flatnonzero(tooth & inside)[:12]
-    asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, energy))
+    asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear))
+    asynchronous = _merged((*asynchronous, *turning), found.resolution)
     if teeth % 2:
         half = _half_odd(parts, p.top, teeth)
         asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))
@@ -125,7 +137,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     low = int(lowest / found.step)
     noise_energy = float(found.floor[low:].sum())
     return Features(
-        layout.frequency, ratio, float(clear[tooth].sum()), float(clear.sum()), half,
+        layout.frequency, ratio, float(clear[tooth].sum()), float(clear.sum()), float(clear[1]), half,
         int(np.sum(energy[first] > 10 * noise[first])), len(first), noise_energy,
         float(found.power[low:].sum() + energy[inside].sum()), _change(parts, np.flatnonzero(tooth & inside), noise),
         asynchronous,
@@ -217,6 +229,36 @@ def _change(parts: _Parts, harmonics: NDArray[np.integer[Any]], noise: Array) ->
     return math.sqrt(max(late, least) / max(early, least)) if least > 0 else 1.0
 
 
+def _merged(found: tuple[Line, ...], within: float) -> tuple[Line, ...]:
+    """Lines strongest first; what lies within `within` [Hz] of a stronger one is part of it."""
+    kept: list[Line] = []
+    for x in sorted(found, key=lambda line: -line.energy):
+        k = next((i for i, other in enumerate(kept) if abs(other.frequency - x.frequency) < within), -1)
+        if k < 0:
+            kept.append(x)
+        else:
+            kept[k] = replace(kept[k], energy=kept[k].energy + x.energy)
+    return tuple(sorted(kept, key=lambda line: -line.energy))
+
+
+def _turning(parts: _Parts, clear: Array, noise: Array, tooth: NDArray[np.bool_],
+             lowest: float) -> tuple[tuple[Line, ...], NDArray[np.bool_]]:
+    """Asynchronous lines so near to a spindle harmonic that the averaging took them in, and which harmonics they are.
+
+    Their phase turns against the tool's rotation, while a line of runout keeps its phase. Harmonics of
+    the tooth passing frequency, and phases that noise could turn as far, are left alone.
+    """
+    mean, trend = parts.one.mean, parts.one.trend
+    noise = np.maximum(noise, np.finfo(float).tiny)
+    power = np.maximum(np.abs(mean) ** 2, np.finfo(float).tiny)
+    rate = np.imag(np.conj(mean) * trend) / (2 * math.pi * power)
+    spread = np.sqrt(noise / power) / parts.layout.revolutions
+    moved = (clear > 10 * noise) & ~tooth & (np.abs(rate) > TURNING + 3 * spread)
+    found = [Line(float((h + rate[h]) * parts.layout.frequency), float(clear[h]), float(clear[h] / noise[h]))
+             for h in np.flatnonzero(moved)]
+    return tuple(x for x in found if x.frequency >= lowest), moved
+
+
 def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
     """True for what a stronger spindle harmonic leaves on both sides of itself where its amplitude or phase varies.
 
@@ -252,7 +294,8 @@ def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spind
     own = [x for x in found if belongs(x, members)]
     total = sum(x.energy for x in found)
     next_to = np.abs(strongest + tooth_frequency * np.array([-2, -1, 1, 2]))
-    sidebands = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
-    return ChatterFamily(strongest, sum(x.energy for x in own), int(sidebands.sum()),
+    seen = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
+    listed = np.array([any(abs(x.frequency - f) <= tolerance for x in found) for f in next_to])
+    return ChatterFamily(strongest, sum(x.energy for x in own), int((seen | listed).sum()),
                          sum(x.energy for x in found if belongs(x, explained)) / total if total > 0 else 0.0,
                          tuple(sorted(x.frequency for x in own)))

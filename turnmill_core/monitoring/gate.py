@@ -9,7 +9,7 @@ import numpy as np
 
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
-from turnmill_core.monitoring.spectrum import Array, Line, Spectrum
+from turnmill_core.monitoring.spectrum import Array, Spectrum
 
 STEP_HZ = 10.0
 
@@ -24,11 +24,11 @@ class Background:
     energy: float = math.nan
     power: Array | None = None
 
-    def line_energy(self, line: Line) -> float:
-        """Mean square that the background holds around a line's frequency."""
+    def line_energy(self, frequency: float) -> float:
+        """Mean square that the background holds around a frequency [Hz]."""
         if self.power is None:
             return 0.0
-        k = int(line.frequency / STEP_HZ)
+        k = int(frequency / STEP_HZ)
         return float(self.power[max(0, k - 1): k + 2].sum())
 
 
@@ -63,7 +63,8 @@ def in_cut(config: ChatterConfig, f: Features, background: Background, chatterin
 
     Either the tooth passing comb is plain, or one family of lines spaced by the tooth passing
     frequency holds a fifth of the energy, and the level exceeds the floor (where one is known) by the
-    gate ratio; while chatter is held (chattering) a tenth is enough.
+    gate ratio; while chatter is held (chattering) a tenth is enough. Above a known floor it is enough,
+    too, that half of the energy lies at spindle harmonics (the first left out) and in the family.
     """
     if plain_comb(f):
         return True
@@ -71,6 +72,9 @@ def in_cut(config: ChatterConfig, f: Features, background: Background, chatterin
     if math.isfinite(floor) and f.energy < config.gate_ratio**2 * floor:
         return False
     c = f.chatter
+    turning = f.synchronous - f.once + (c.energy if c is not None else 0.0)
+    if math.isfinite(floor) and turning > 0.5 * f.energy:
+        return True
     if c is None:
         return False
     return c.energy > 0.1 * f.energy if chattering else c.sidebands >= 1 and c.energy > 0.2 * f.energy

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.blocks import Status
+from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
+from turnmill_core.monitoring.growth import Seen, remember, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
@@ -41,12 +43,13 @@ SCORE_MEMORY = 0.9
 @dataclass(frozen=True)
 class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
-    ratios on their grid, and the newest ratio of true to assumed speed."""
+    ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
     scores: Array | None = None
     ratio: float = 1.0
+    history: tuple[Seen, ...] = ()
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -90,7 +93,7 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
 
 
 def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tuple[Tracker, Verdict]:
-    return replace(tracker, held=Held()), replace(blank, reason=reason, reason_text=text)
+    return replace(tracker, held=Held(), history=()), replace(blank, reason=reason, reason_text=text)
 
 
 def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
@@ -108,26 +111,41 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
         ratio, _ = best_ratio(grid, scores)
         band = (ratio - 2e-3, ratio + 2e-3)
     ratio = min(band[1], max(band[0], ratio))
-    f = features(p, turns, steady, config.teeth, config.band[0], ratio, band)
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
-    judgement = judge(config, f, tracker.background, cut, chattering, prior)
+    history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
+    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning)
     held = persist(config, tracker.held, judgement.kind, plain_comb(f))
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
         background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
     verdict = _verdict(config, blank, f, judgement, held)
-    return Tracker(held, background, scores, f.speed_ratio), verdict
+    found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
+                     held.kind != judgement.kind, tracker.background.energy)
+    verdict = replace(verdict, confidence=confidence(held.kind, found))
+    return Tracker(held, background, scores, f.speed_ratio, history), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
     """Evidence for each ratio of true to nominal speed; large departures need more of it."""
-    scores = comb_score(whole, config.teeth * frequency, grid)
+    scores = comb_score(whole, config.principal_teeth * frequency, grid)
     strongest = lines(whole, config.band[0], 100.0, 1)
     if strongest:
-        scores = scores + family_score(whole, strongest[0].frequency, frequency, config.teeth, grid)
+        scores = scores + family_score(whole, strongest[0].frequency, frequency, config.principal_teeth, grid)
     found: Array = scores - 0.3 * ((grid - 1) / config.nominal_band) ** 2
     return found
+
+
+def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
+            end_ns: int) -> tuple[tuple[Seen, ...], float]:
+    """Families of the last windows, and the time [s] in which a steadily growing one passes the enter threshold."""
+    c = f.chatter
+    if c is None or c.sidebands == 0 or c.explained < 0.5:
+        return (), math.inf
+    share = c.energy / (c.energy + f.synchronous)
+    history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), 0.02 * c.frequency)
+    return history, time_to(history, config.enter_ratio)
 
 
 def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judgement, held: Held) -> Verdict:
@@ -144,7 +162,6 @@ def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judg
         tooth_passing_frequency=config.teeth * f.frequency, spindle_speed=2 * math.pi * f.frequency,
         spindle_speed_source=SpeedSource.REFINED if f.comb >= 2 else blank.spindle_speed_source,
         asynchronous_ratio=judgement.asynchronous_ratio, half_order_ratio=judgement.half_order_ratio,
-        confidence=judgement.confidence,
     )
 
 

@@ -1,0 +1,56 @@
+"""Early warning: is a small asynchronous line growing exponentially?
+
+Chatter grows as exp(rate t) from the noise until the tool leaves the material. The amplitude of the
+strongest family over the last windows gives the rate; while it is still below the thresholds a
+steady growth already tells when it will pass them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+WINDOWS = 6
+"""Windows over which a growth is looked at."""
+
+SLOWEST = 2.0
+"""Growth of the amplitude [1/s] below which no warning is given."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Strongest family of one window: time [s] of the window's end, frequency [Hz], its share of the energy."""
+
+    time: float
+    frequency: float
+    share: float
+
+
+def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float) -> tuple[Seen, ...]:
+    """History with `seen`; begins anew where the frequency [Hz] moved by more than `tolerance` [Hz]."""
+    if history and abs(history[-1].frequency - seen.frequency) > tolerance:
+        return (seen,)
+    return (*history[-WINDOWS + 1:], seen)
+
+
+def rate(history: tuple[Seen, ...]) -> float:
+    """Growth of the amplitude [1/s] by a straight line through its logarithm; NaN where it does not grow steadily.
+
+    Steady: a full history, each window's share above the one before it.
+    """
+    shares = np.array([s.share for s in history])
+    if len(history) < WINDOWS or np.any(shares <= 0) or np.any(np.diff(shares) <= 0):
+        return math.nan
+    t = np.array([s.time for s in history])
+    t = t - t.mean()
+    return float(np.sum(t * np.log(shares)) / np.sum(t**2) / 2)
+
+
+def time_to(history: tuple[Seen, ...], share: float) -> float:
+    """Seconds until the share passes `share`, if the growth goes on; infinite without a steady growth."""
+    found = rate(history)
+    if not found >= SLOWEST:
+        return math.inf
+    return max(0.0, math.log(share / history[-1].share) / (2 * found))
