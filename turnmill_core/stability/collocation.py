@@ -28,6 +28,7 @@ from turnmill_core.stability._kernels.cut import MOST_NODES
 from turnmill_core.stability.floquet import FloquetVerdict, verdict_from_map
 from turnmill_core.stability.problem import Engagement, StabilityProblem, contact_basis
 from turnmill_core.stability.semidiscretization import PeriodMap
+from turnmill_core.stability.threads import one_thread
 from turnmill_core.structure.modal import LinearStructure
 
 Floats = NDArray[np.float64]
@@ -177,7 +178,7 @@ def _shift(problem: StabilityProblem) -> float:
     return problem.tool_speed * problem.delays[0] - problem.pitch[0] if problem.uniform else 0.0
 
 
-def solve(problem: StabilityProblem, tolerance: float = 3e-5) -> FloquetVerdict:
+def solve(problem: StabilityProblem, tolerance: float = 1e-4) -> FloquetVerdict:
     """Verdict of one problem, with more nodes until the spectral radius is good to `tolerance` by its own estimate.
 
     tolerance: relative where the radius is above 1, at least TOLERANCE.
@@ -246,7 +247,8 @@ def series_multipliers(
     for i in np.flatnonzero(residuals > 10 * TOLERANCE * np.maximum(1, np.abs(multipliers))):
         one = p.at(tool_speed=tool_speed, delays=tuple(delays), delay_variation=float(variation[i]),
                    engagement=Engagement(series.heights[i], series.starts[i], series.stops[i]))
-        mu: Complexes = np.linalg.eigvals(period_map(one, base_nodes).matrix).astype(np.complex128)
+        with one_thread():
+            mu: Complexes = np.linalg.eigvals(period_map(one, base_nodes).matrix).astype(np.complex128)
         leading = mu[np.argmax(np.abs(mu))]
         multipliers[i] = complex(leading.real, abs(leading.imag))
     return multipliers

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from turnmill_core.prediction import PredictedType
+from turnmill_core.stability.threads import one_thread
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -135,9 +136,11 @@ def verdict_from_map(matrix: Floats, displacement: Floats, period: float) -> Flo
     """Verdict from the matrix (L, L) over one period and its displacement observer (k, 3, L)."""
     if not np.all(np.isfinite(matrix)):
         raise ValueError("the map over one period is not finite, expected finite numbers; take more steps")
-    mu = np.linalg.eigvals(matrix).astype(np.complex128)
-    leading = mu[np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))[0]]
-    return verdict(mu, displacement @ eigenvector(matrix, complex(leading)), period)
+    with one_thread():
+        mu = np.linalg.eigvals(matrix).astype(np.complex128)
+        leading = mu[np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))[0]]
+        vector = eigenvector(matrix, complex(leading))
+    return verdict(mu, displacement @ vector, period)
 
 
 def eigenvector(matrix: Floats, value: complex) -> Complexes:

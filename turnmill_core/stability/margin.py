@@ -20,6 +20,7 @@ from turnmill_core.stability.floquet import chatter_family
 from turnmill_core.stability.lobes import Lobes as Lobes
 from turnmill_core.stability.lobes import stability_lobes as stability_lobes
 from turnmill_core.stability.operating_point import depth_family, stability_problem
+from turnmill_core.stability.problem import StabilityProblem
 from turnmill_core.stability.search import depth_limit, stable_depths
 
 Floats = NDArray[np.float64]
@@ -88,11 +89,14 @@ def stability_point(op: Operation, conditions: Conditions, delay_model: DelayMod
     """
     if not conditions.in_cut:
         return StabilityPoint(NAN, np.empty(0, np.complex128), PredictedType.NO_CUT, NAN, np.empty(0), NAN, NAN)
-    problem = stability_problem(op, conditions, delay_model)
+    return _judged(stability_problem(op, conditions, delay_model))
+
+
+def _judged(problem: StabilityProblem) -> StabilityPoint:
     found = solve(problem)
-    highest = 3 * float(np.abs(np.linalg.eigvals(problem.structure.A)).max()) / (2 * math.pi)
     family = np.empty(0)
     if found.predicted_type is not PredictedType.STABLE:
+        highest = 3 * float(np.abs(np.linalg.eigvals(problem.structure.A)).max()) / (2 * math.pi)
         family = chatter_family(complex(found.multipliers[0]), found.period, highest)
     return StabilityPoint(
         found.spectral_radius, found.multipliers, found.predicted_type, found.chatter_frequency, family, found.period,
@@ -119,21 +123,23 @@ def stability_margin(
     the limit is that of the cut at these speeds and this immersion, where there is one.
     Raises ``ValueError`` for a rigid structure or a depth beyond the flute length.
     """
-    point = stability_point(op, conditions, delay_model)
     searched = searched_depth(op, conditions) if depth_search is None else depth_search
     require(0 < searched <= op.tool.flute_length, "depth search", searched, "m",
             f"in (0, {op.tool.flute_length}] m, the flute length")
+    cuts = conditions.tool_speed > 0 and conditions.radial_immersion > 0
+    family = depth_family(op, conditions, max(searched, conditions.depth), delay_model) if cuts else None
+    point = stability_point(op, conditions, delay_model) if family is None or not conditions.in_cut else _judged(
+        family.problem(conditions.depth))
     base = {
         "tool_speed": conditions.tool_speed, "workpiece_speed": conditions.workpiece_speed, "depth": conditions.depth,
         "depth_searched": searched, "spectral_radius": point.spectral_radius, "multipliers": point.multipliers,
         "predicted_type": point.predicted_type, "chatter_frequency": point.chatter_frequency,
         "principal_period": point.principal_period, "delay": point.delay,
     }
-    if not (conditions.tool_speed > 0 and conditions.radial_immersion > 0):
+    if family is None:
         return Margin(**base, depth_limit=NAN, stable_depths=np.empty((0, 2)), depth_ratio=NAN,  # type: ignore[arg-type]
                       nearest_stable_speed=NAN, limit_type=PredictedType.UNKNOWN, limit_frequency=NAN)
-    family = depth_family(op, conditions, searched, delay_model)
-    intervals = stable_depths(family)
+    intervals = stable_depths(family, searched=searched)
     limit = depth_limit(intervals, conditions.depth)
     limit_type, limit_frequency = PredictedType.UNKNOWN, NAN
     if 0 < limit < searched:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class DepthFamily:
     """The stability problems of one cut at all depths up to a deepest one, else the same.
 
     op, conditions: where they come from, at the deepest depth; delay_model: as in stability_problem. structure: at the
-    cutting point. below (k,): depths under the surface [m], ascending from 0; start, stop (k, 2): engagement angles
+    cutting point. below (k,): depths under the surface [m], ascending from 0; start, stop (k, arcs): engagement angles
     there [rad]; kink [m]: depth below which the bar is wider than the cut (0: nowhere).
     """
 
@@ -56,20 +56,20 @@ class DepthFamily:
     kink: float
 
     def arcs(self, depths: Sequence[float] | Floats) -> tuple[Floats, Floats, Floats]:
-        """Heights (n, k), start and exit angles (n, k, 2) of the engagement at several depths [m]."""
-        bar = self.op.process == "turn-milling"
-        places = np.stack([_places(float(a), self.kink) if bar else np.array([a, 0.0]) for a in depths])
-        heights = places[:, :1] - places
-        angles = (np.stack([np.interp(places, self.below, v[:, i]) for i in range(2)], axis=-1)
-                  for v in (self.start, self.stop))
-        return heights, *angles
+        """Heights (n, k), start and exit angles (n, k, arcs) of the engagement at several depths [m]."""
+        depth = np.asarray(depths, dtype=np.float64)
+        if self.op.process == "milling":
+            start, stop = (np.tile(v[0], (depth.size, 2, 1)) for v in (self.start, self.stop))
+            return np.column_stack([np.zeros_like(depth), depth]), start, stop
+        places = np.stack([_places(float(a), self.kink) for a in depth])
+        start, stop = (np.stack([np.interp(places, self.below, arc) for arc in v.T], axis=-1)
+                       for v in (self.start, self.stop))
+        return places[:, :1] - places, start, stop
 
     def problem(self, depth: float, tool_speed: float | None = None) -> StabilityProblem:
         """The problem at a depth [m] and tool_speed [rad/s] (None: the conditions')."""
         heights, start, stop = self.arcs([depth])
-        op, conditions = self.op, at_depth(self.op, self.conditions, depth)
-        if tool_speed is not None:
-            conditions = replace(conditions, tool_speed=tool_speed)
+        op, conditions = self.op, at_depth(self.op, self.conditions, depth, tool_speed)
         delays, variation = regeneration(op, conditions, self.delay_model)
         return StabilityProblem(
             structure=self.structure, tool_speed=conditions.tool_speed, pitch=tuple(float(p) for p in op.tool.pitch),
@@ -77,19 +77,26 @@ class DepthFamily:
             coefficients=(op.material.Ktc, op.material.Krc, op.material.Kac),
             engagement=Engagement(heights[0], start[0], stop[0]))
 
+    @cached_property
+    def deepest(self) -> StabilityProblem:
+        """The problem at the deepest cut."""
+        return self.problem(self.conditions.depth)
+
     def series(self, depths: Sequence[float] | Floats) -> DepthSeries:
         """The depths prepared for the fast solver."""
-        heights, start, stop = self.arcs(depths)
-        return depth_series(self.problem(float(depths[-1])), heights, start, stop)
+        return depth_series(self.deepest, *self.arcs(depths))
 
     def multipliers(self, series: DepthSeries, tool_speed: float | None = None) -> Complexes:
         """Leading multipliers of the series at tool_speed [rad/s] (None: the conditions')."""
         speed = self.conditions.tool_speed if tool_speed is None else tool_speed
-        depths = series.heights[:, -1] if self.delay_model == "first-principles" else series.heights[:1, -1]
-        found = [regeneration(self.op, replace(at_depth(self.op, self.conditions, float(a)), tool_speed=speed),
-                              self.delay_model) for a in depths]
-        variation = np.array([v for _, v in found]) if len(found) > 1 else np.full(len(series.heights), found[0][1])
-        return series_multipliers(series, speed, found[0][0], variation)
+        variation = np.zeros(len(series.heights))
+        if self.delay_model == "first-principles":
+            found = [regeneration(self.op, at_depth(self.op, self.conditions, float(a), speed), self.delay_model)
+                     for a in series.heights[:, -1]]
+            delays, variation = found[0][0], np.array([v for _, v in found])
+        else:
+            delays = regeneration(self.op, at_depth(self.op, self.conditions, None, speed), self.delay_model)[0]
+        return series_multipliers(series, speed, delays, variation)
 
 
 def depth_family(
@@ -113,7 +120,9 @@ def depth_family(
     else:
         kink = min(max(deepest - _narrowing_height(op, cut), 0.0), deepest)
         below, start, stop = _bar_arcs(op, cut, kink)
-    require(bool(np.any(stop > start)), "engagement", 0.0, "rad", "a tool that cuts")
+    cuts = np.any(stop > start, axis=0)
+    require(bool(np.any(cuts)), "engagement", 0.0, "rad", "a tool that cuts")
+    start, stop = start[:, cuts], stop[:, cuts]
     return DepthFamily(op, cut, delay_model, contact_structure(op, cut), below, start, stop, kink)
 
 
@@ -192,10 +201,17 @@ def _narrowing_height(op: Operation, conditions: Conditions) -> float:
     return math.sqrt(op.workpiece.radius**2 - reach**2) - conditions.effective_radius
 
 
-def at_depth(op: Operation, conditions: Conditions, depth: float) -> Conditions:
-    """The same instant with another depth [m]: same speeds and feed, the tip nearer to or farther from the axis."""
+def at_depth(
+    op: Operation, conditions: Conditions, depth: float | None, tool_speed: float | None = None,
+) -> Conditions:
+    """The same instant of `op` at another depth [m] and tool_speed [rad/s] (None: the same).
+
+    The tip is nearer to or farther from the axis of a bar; the workpiece's speed and the feed do not change.
+    """
+    a = conditions.depth if depth is None else depth
+    speed = conditions.tool_speed if tool_speed is None else tool_speed
     if op.process == "milling":
-        return replace(conditions, depth=depth)
-    radius = conditions.effective_radius + conditions.depth - depth
-    require(radius > 0, "depth", depth, "m", f"less than the bar's radius {op.workpiece.radius} m")
-    return replace(conditions, depth=depth, effective_radius=radius)
+        return replace(conditions, depth=a, tool_speed=speed)
+    radius = conditions.effective_radius + conditions.depth - a
+    require(radius > 0, "depth", a, "m", f"less than the bar's radius {op.workpiece.radius} m")
+    return replace(conditions, depth=a, effective_radius=radius, tool_speed=speed)

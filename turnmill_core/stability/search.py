@@ -10,7 +10,7 @@ from turnmill_core.stability.operating_point import DepthFamily
 
 Floats = NDArray[np.float64]
 
-SCAN_DEPTHS = 20
+SCAN_DEPTHS = 16
 """Depths at which the spectral radius is sampled before its crossings of 1 are refined."""
 
 
@@ -45,22 +45,35 @@ def crossing(
     The secant's guess and a neighbour on either side are solved together and close in on it. tool_speed [rad/s] (None:
     the family's). tolerance: of the bracket, relative to the depth.
     """
-    (low, high), (f_low, f_high) = bracket, excess
-    near = 0.03
+    (low, high), (f_low, f_high) = map(float, bracket), map(float, excess)
+    third: tuple[float, float] | None = None
+    near = 0.02
     for _ in range(40):
         width = high - low
         if width <= tolerance * high:
             break
-        guess = low + width * min(max(f_low / (f_low - f_high), near), 1 - near)
-        places = np.array([guess - 0.9 * near * width, guess + 0.9 * near * width])
-        found = np.log(np.abs(family.multipliers(family.series(places), tool_speed)))
-        if (f_low < 0) != (found[0] < 0):
-            high, f_high = float(places[0]), float(found[0])
-        elif (found[0] < 0) != (found[1] < 0):
-            low, high, f_low, f_high = float(places[0]), float(places[1]), float(found[0]), float(found[1])
+        guess = _inverse(low, high, f_low, f_high, third)
+        guess = min(max(guess, low + near * width), high - near * width)
+        places = np.array([guess - 0.5 * near * width, guess + 0.5 * near * width])
+        left, right = (float(v) for v in np.log(np.abs(family.multipliers(family.series(places), tool_speed))))
+        if (f_low < 0) != (left < 0):
+            third, high, f_high = (high, f_high), float(places[0]), left
+        elif (left < 0) != (right < 0):
+            third, low, high, f_low, f_high = (low, f_low), float(places[0]), float(places[1]), left, right
         else:
-            low, f_low = float(places[1]), float(found[1])
-    return float(low + (high - low) * f_low / (f_low - f_high))
+            third, low, f_low = (low, f_low), float(places[1]), right
+    return low + (high - low) * f_low / (f_low - f_high)
+
+
+def _inverse(low: float, high: float, f_low: float, f_high: float, third: tuple[float, float] | None) -> float:
+    """Zero by inverse quadratic interpolation through three points, or by the secant through two."""
+    secant = low + (high - low) * f_low / (f_low - f_high)
+    if third is None or third[1] in (f_low, f_high):
+        return secant
+    x, f = third
+    found = (low * f_high * f / ((f_low - f_high) * (f_low - f)) + high * f_low * f / ((f_high - f_low) * (f_high - f))
+             + x * f_low * f_high / ((f - f_low) * (f - f_high)))
+    return found if low < found < high else secant
 
 
 def depth_limit(intervals: Floats, depth: float) -> float:

@@ -22,6 +22,7 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from turnmill_core.stability.problem import StabilityProblem, contact_basis, frame_matrix, mean_directional_matrices
+from turnmill_core.stability.threads import one_thread
 
 Floats = NDArray[np.float64]
 
@@ -55,8 +56,9 @@ def period_map(problem: StabilityProblem, steps: int | None = None, order: int =
     how the delayed displacement varies within a step. Raises ``ValueError`` for another order, less
     than two steps, or a delay shorter than a step.
     """
-    grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
-    end, observed = _march(grid, np.eye(grid.size))
+    with one_thread():
+        grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
+        end, observed = _march(grid, np.eye(grid.size))
     return PeriodMap(end, problem.period, observed)
 
 
@@ -65,10 +67,11 @@ def leading_multiplier(problem: StabilityProblem, steps: int | None = None, orde
 
     Meant for many steps; arguments and errors as in period_map.
     """
-    grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
-    start = np.cos(np.arange(grid.size))
-    operator = LinearOperator((grid.size, grid.size), matvec=lambda v: _march(grid, v.reshape(-1, 1))[0].ravel())
-    found = eigs(operator, k=4, v0=start, ncv=min(24, grid.size - 1), return_eigenvectors=False, tol=1e-10)
+    with one_thread():
+        grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
+        start = np.cos(np.arange(grid.size))
+        operator = LinearOperator((grid.size, grid.size), matvec=lambda v: _march(grid, v.reshape(-1, 1))[0].ravel())
+        found = eigs(operator, k=4, v0=start, ncv=min(24, grid.size - 1), return_eigenvectors=False, tol=1e-10)
     value = found[np.argmax(np.abs(found))]
     return complex(value.real, abs(value.imag))
 
