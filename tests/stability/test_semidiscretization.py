@@ -10,13 +10,13 @@ from turnmill_core.operation import RIGID, Mode, Structure
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.floquet import classify, verdict_from_map
 from turnmill_core.stability.problem import StabilityProblem, constant_engagement, directional_matrix
-from turnmill_core.stability.semidiscretization import default_steps, period_map
+from turnmill_core.stability.semidiscretization import default_steps, leading_multiplier, period_map
 from turnmill_core.structure.modal import frf, modal_model, state_space
 
 
 def radius(problem: StabilityProblem, steps: int, order: int = 1) -> float:
     """Spectral radius by the reference solver."""
-    return float(np.abs(np.linalg.eigvals(period_map(problem, steps, order).matrix)).max())
+    return abs(leading_multiplier(problem, steps, order))
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -61,9 +61,8 @@ def test_four_teeth_in_a_slot_are_turning() -> None:
         tau = (phase + 2 * np.pi * lobe) / (2 * np.pi * f)
         rpm = 30 / np.pi * (np.pi / 2) / tau
         problem = textbook(depth, rpm=rpm, teeth=4)
-        mu = np.linalg.eigvals(period_map(problem, 400).matrix)
-        assert np.abs(mu).max() == pytest.approx(1.0, abs=2e-4)
-        leading = mu[np.argmax(np.abs(mu))]
+        leading = leading_multiplier(problem, 400)
+        assert abs(leading) == pytest.approx(1.0, abs=2e-4)
         turns = np.array([1, -1])[:, None] * np.angle(leading) / (2 * np.pi) + np.arange(9)
         lines = turns / problem.period
         assert np.min(np.abs(lines - f)) < 0.3
@@ -73,7 +72,7 @@ def test_four_teeth_in_a_slot_are_turning() -> None:
 def test_direct_integration_grows_at_the_same_rate(depth: float, shift: float, lag: float) -> None:
     """Heun's method with its own grid and history on the same equation, growth over many periods."""
     problem = textbook(depth, rpm=9000, exit=2.0, axes=2, shift=shift, lag=lag)
-    k, periods = 400, 160
+    k, periods = 300, 120
     dt = problem.period / k
     A, B, C = problem.structure.A, problem.structure.B, problem.structure.C[:2]
     G = sum(directional_matrix(problem, problem.tool_speed * dt * np.arange(k) + a) for a in problem.tooth_angles)
@@ -90,10 +89,10 @@ def test_direct_integration_grows_at_the_same_rate(depth: float, shift: float, l
         guess = x + dt * slope
         x = x + dt / 2 * (slope + A @ guess + B @ G[(i + 1) % k] @ (C @ guess - past(i + 1)))
         d[i + 1] = C @ x
-        if (i + 1) % (k * 40) == 0:
+        if (i + 1) % (k * 30) == 0:
             norm.append(np.linalg.norm(d[i + 1 - 4 * k:i + 2]))
-    growth = (norm[-1] / norm[0]) ** (1 / (40 * (len(norm) - 1)))
-    assert growth == pytest.approx(radius(problem, 400), abs=4e-3)
+    growth = (norm[-1] / norm[0]) ** (1 / (30 * (len(norm) - 1)))
+    assert growth == pytest.approx(radius(problem, 400), abs=6e-3)
 
 
 def test_turning_the_frame_about_the_tool_axis_changes_nothing() -> None:
@@ -124,6 +123,12 @@ def test_flip_verdict_has_half_order_lines() -> None:
     tooth = 2 * 18000 / 60
     assert found.chatter_frequency / tooth % 1 == pytest.approx(0.5, abs=1e-9)
     assert abs(found.chatter_frequency - 922) < tooth / 2
+
+
+def test_the_leading_multiplier_is_that_of_the_matrix() -> None:
+    for problem in (textbook(0.5e-3), textbook(0.3e-3, exit=1.5, axes=2, shift=0.3, lag=300.0)):
+        mu = np.linalg.eigvals(period_map(problem, 60).matrix)
+        assert radius(problem, 60) == pytest.approx(np.abs(mu).max(), rel=1e-8)
 
 
 @pytest.mark.parametrize(("arguments", "message"), [((1, 1), "steps"), ((40, 2), "order")])
