@@ -116,7 +116,7 @@ def test_windows_whose_verdict_was_not_recorded_go_without_a_prediction(live: li
 
 def test_a_live_window_does_not_wait_for_axis_states_for_ever() -> None:
     op = operation()
-    feed = MonitorFeed(FeedSettings())
+    feed = MonitorFeed(FeedSettings(changes={"speed_timeout": 0.5}))
     steps: list[Step] = [lambda feed: feed.operation(START, op)]
     steps += [lambda feed, b=b: feed.block(b) for b in blocks(op)]
     judged = [pair for step in steps for pair in step(feed)]

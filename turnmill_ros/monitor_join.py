@@ -32,8 +32,11 @@ from turnmill_ros.block_counts import BlockCounts
 from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.predicted import Predictor
 
-MOST_HELD = 3000
-"""Blocks that wait at most; beyond it the oldest is judged with what is known."""
+LONGEST_WAIT_NS = 90_000_000_000
+"""Time over which blocks are held at most; beyond it the oldest is judged with what is known.
+
+In a replay at maximum speed one topic may be ahead of another by what the middleware holds: 10 000 axis states, 40 s.
+"""
 
 MOST_RECORDED = 20_000
 KEPT_AXES_NS = 2_000_000_000
@@ -104,7 +107,7 @@ class MonitorFeed:
         """A block of samples, in the order of its stream."""
         self.counts.add(block)
         self._held.append(block)
-        if len(self._held) > MOST_HELD and self.operations.first is None:
+        if self.operations.first is None and self._waited() > LONGEST_WAIT_NS:
             self._held.popleft()
             self.dropped += 1
         return self._pump()
@@ -159,7 +162,7 @@ class MonitorFeed:
         while self._held:
             block = self._held[0]
             operation = self.operations.at(block.stamp_ns)
-            patient = not ending and len(self._held) <= MOST_HELD
+            patient = not ending and self._waited() <= LONGEST_WAIT_NS
             if operation is None or (patient and not self._ready(block, operation)):
                 break
             if operation is not self._running:
@@ -172,6 +175,9 @@ class MonitorFeed:
             judged += self._give(block)
             judged += self._give_recorded()
         return tuple(judged)
+
+    def _waited(self) -> int:
+        return self._held[-1].stamp_ns - self._held[0].stamp_ns
 
     def _ready(self, block: SensorBlock, operation: Operation) -> bool:
         """Whether everything that the windows ending in `block` wait for has arrived.

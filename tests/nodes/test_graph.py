@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -41,9 +43,11 @@ def recorded(path: Path) -> list[Verdict]:
     return [verdict_from_message(m.message) for m in read_bag(path, ["chatter_state"])]
 
 
-def same(left: object, right: object) -> bool:
-    """Equal field by field; a number that is not there equals one that is not there."""
-    return [repr(v) for v in left] == [repr(v) for v in right]  # type: ignore[attr-defined]
+def differences(left: Sequence[Verdict], right: Sequence[Verdict]) -> list[tuple[int, str, object, object]]:
+    """Where two runs differ: window, field, both values; a number that is not there equals one that is not there."""
+    assert len(left) == len(right)
+    return [(k, field.name, a, b) for k, pair in enumerate(zip(left, right, strict=True)) for field in fields(Verdict)
+            if repr(a := getattr(pair[0], field.name)) != repr(b := getattr(pair[1], field.name))]
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +76,8 @@ def test_the_bag_holds_every_axis_state_and_every_verdict(live: tuple[GraphResul
     assert len(states) == int(result.values["controller"]["joint_states_sent"]) == round(SECONDS * 250) + 1
     op, start, period = operation(), states[0].stamp_ns, 4_000_000
     assert states == [axis_state_at(op, k * period * 1e-9, start + k * period) for k in range(len(states))]
-    assert same(seen, result.verdicts)
-    assert same(recorded(path), result.verdicts)
+    assert differences(seen, result.verdicts) == []
+    assert differences(recorded(path), result.verdicts) == []
     last = result.verdicts[-1].window_end_ns
     assert 0 <= states[-1].stamp_ns - last < 100_000_000
     kinds = [v.state for v in result.verdicts]
@@ -89,10 +93,10 @@ def test_replay_and_analysis_give_the_live_verdicts(
     result, path, _ = live
     again = replay(path, rate=math.inf, output=tmp_path / "again.mcap")
     assert again.sent == again.received == again.judged == again.recorded == result.sent
-    assert same(again.verdicts, result.verdicts)
-    assert same(recorded(tmp_path / "again.mcap"), result.verdicts)
-    assert same(analyze(path).verdicts, result.verdicts)
-    assert same(analyze(tmp_path / "again.mcap").verdicts, result.verdicts)
+    assert differences(again.verdicts, result.verdicts) == []
+    assert differences(recorded(tmp_path / "again.mcap"), result.verdicts) == []
+    assert differences(analyze(path).verdicts, result.verdicts) == []
+    assert differences(analyze(tmp_path / "again.mcap").verdicts, result.verdicts) == []
     inputs = ["operation", "joint_states", "sensor_blocks"]
     assert {t.name: t.count for t in bag_info(tmp_path / "again.mcap").topics if t.name[1:] in inputs} == {
         t.name: t.count for t in bag_info(path).topics if t.name[1:] in inputs}
@@ -107,7 +111,7 @@ def test_a_replay_with_another_operation_computes_its_predictions_anew(
     assert again.sent == again.judged == again.recorded
     stamps = [{v.prior.stamp_ns for v in result.verdicts if v.prior} for result in (again, live[0])]
     assert stamps[0] - stamps[1]
-    assert same(analyze(path, other).verdicts, again.verdicts)
+    assert differences(analyze(path, other).verdicts, again.verdicts) == []
     assert [m.message.sha256 for m in read_bag(tmp_path / "other.mcap", ["operation"])] == [other.sha256]
 
 

@@ -44,6 +44,7 @@ SETTINGS = {
     "enter_dwell": Setting("windows in a row before chatter begins in a cut", 1, 100),
     "lone_dwell": Setting("windows in a row before chatter begins where only the chatter shows a cut", 1, 100),
     "leave_dwell": Setting("windows in a row before chatter ends", 1, 100),
+    "marginal_dwell": Setting("windows in a row before the cut is called marginal", 1, 100),
     "cut_dwell": Setting("windows in a row before the state changes between air and cut", 1, 100),
 }
 """The monitor's settings that are parameters; its others come from the operation and from `prior` and `axes`."""
