@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -9,12 +11,15 @@ from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.prediction import PredictedType
+from turnmill_core.stability.collocation import leading_multiplier, period_map
+from turnmill_core.stability.delay import DelayModel
+from turnmill_core.stability.lobes import stability_boundary
 from turnmill_core.stability.margin import (
     stability_lobes,
     stability_margin,
     stability_point,
 )
-from turnmill_core.stability.operating_point import at_depth, stability_problem
+from turnmill_core.stability.operating_point import at_depth, depth_family, stability_problem
 
 RPM = np.pi / 30
 DEPTHS = {0.2e-3: 0.81974278, 0.5e-3: 1.07397559, 1.0e-3: 1.40647353}
@@ -133,6 +138,55 @@ def test_impossible_diagrams_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         stability_lobes(milling, speeds, depths)
+
+
+def test_impossible_cuts_are_refused(milling: Operation) -> None:
+    short = dataclasses.replace(milling, tool=dataclasses.replace(milling.tool, flute_length=1e-3))
+    deep = dataclasses.replace(milling.conditions, depth=2e-3)
+    with pytest.raises(ValueError, match="flute length"):
+        stability_point(short, deep)
+    with pytest.raises(ValueError, match="flute length"):
+        stability_margin(short, short.conditions, depth_search=2e-3)
+    for change, message in (({"tool_speed": 0.0}, "tool speed"), ({"depth": 0.0}, "depth"),
+                            ({"cross_feed_span": (0.005, 0.005)}, "radial immersion")):
+        with pytest.raises(ValueError, match=message):
+            stability_problem(milling, dataclasses.replace(milling.conditions, **change))
+
+
+@pytest.mark.parametrize("delay_model", ["mean", "milling", "first-principles"])
+def test_every_delay_model_goes_through_the_fast_solver(case_1: Operation, delay_model: DelayModel) -> None:
+    """A fast workpiece, so that the models differ: each depth of the series is the point's own result."""
+    cut = with_cut(case_1, workpiece_speed=120 * RPM, depth=3e-3)
+    family = depth_family(case_1, cut, 3e-3, delay_model)
+    found = np.abs(family.multipliers(family.series([1e-3, 2e-3, 3e-3]), 310.0))
+    for depth, value in zip((1e-3, 2e-3, 3e-3), found, strict=True):
+        there = with_cut(case_1, tool_speed=310.0, workpiece_speed=120 * RPM, depth=depth)
+        assert stability_point(case_1, there, delay_model).spectral_radius == pytest.approx(value, abs=1e-4)
+
+
+def test_the_delay_models_differ_where_the_workpiece_is_fast(case_1: Operation) -> None:
+    cut = with_cut(case_1, workpiece_speed=120 * RPM, depth=3e-3)
+    found = [stability_point(case_1, cut, model).spectral_radius for model in ("mean", "milling", "first-principles")]
+    assert np.ptp(found) > 0.01
+
+
+def test_low_speed_makes_large_maps_and_still_ends(case_1: Operation) -> None:
+    problem = stability_problem(case_1, with_cut(case_1, tool_speed=200 * RPM))
+    assert len(period_map(problem).matrix) > 300
+    point = stability_point(case_1, with_cut(case_1, tool_speed=200 * RPM))
+    assert point.spectral_radius == pytest.approx(abs(leading_multiplier(problem)), abs=1e-4)
+
+
+def test_the_boundary_is_where_the_diagram_turns(case_1: Operation) -> None:
+    speeds, depths = np.array([3000.0, 3350.0, 3600.0]) * RPM, np.linspace(0.2e-3, 5e-3, 25)
+    lobes = stability_lobes(case_1, speeds, depths)
+    seen: list[int] = []
+    for j, intervals in enumerate(stability_boundary(case_1, speeds, 5e-3, progress=lambda done, _: seen.append(done))):
+        inside = [np.any((intervals[:, 0] <= a) & (a <= intervals[:, 1])) for a in depths]
+        far = np.abs(lobes.spectral_radius[:, j] - 1) > 1e-3
+        np.testing.assert_array_equal(np.array(inside)[far], lobes.spectral_radius[far, j] < 1)
+        assert lobes.depth_limit[j] == pytest.approx(intervals[0, 1], abs=0.02e-3)
+    assert seen == [1, 2, 3]
 
 
 def test_an_unknown_delay_model_is_refused(case_1: Operation) -> None:

@@ -134,8 +134,9 @@ def _lagrange(nodes: Floats, points: Floats) -> Floats:
 def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes: int = 0) -> PeriodMap:
     """Map over one principal period by collocation.
 
-    base_nodes: nodes of an element beyond what its oscillation asks for; more is more accurate. probes: number of
-    equally spaced times at which the contact displacement is observed.
+    State: modal state, then for each channel past . y at the times before the period's start at which it is needed,
+    oldest first. base_nodes: nodes of an element beyond what its oscillation asks for; more is more accurate. probes:
+    number of equally spaced times at which the contact displacement is observed.
     """
     m, t, e = modal_blocks(problem.structure), tables(), problem.engagement
     omega, period = problem.tool_speed, problem.tool_speed * problem.period
@@ -153,12 +154,18 @@ def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes
         edges, nodes, origin, t.nodes, offsets, delays, problem.delay_variation, _joined(problem), problem.rotating,
         omega, c, friction, m.basis, lag, height, start, stop, *problem.coefficients)
     outputs = m.outputs(c > 0)
+    slot, seen = operators.slots_of(angle, delay, period, 2 * m.lam.size)
+    turn, F, K, R, own, first = operators.operators(
+        m.lam, outputs, m.B, omega, edges, nodes, element, node, now, b, t.nodes, t.points, t.weights, t.ell)
+    at, rows = operators.sightings(seen, past, edges, nodes, omega, m.lam, outputs, t.support, t.bary)
     times = np.repeat(period / max(probes, 1) * np.arange(probes), 2)
     weight = np.zeros((times.size, len(outputs)))
     weight[:, :m.basis.shape[1]] = np.tile(m.basis, (probes, 1))
+    seen_at, seen_rows = operators.sightings(times, weight, edges, nodes, omega, m.lam, outputs, t.support, t.bary)
+    LU, pivot = np.empty_like(own), np.empty(own.shape[:2], dtype=np.int64)
+    operators.factors(1.0, own, first, LU, pivot)
     matrix, shown = operators.dense_map(
-        m.lam, outputs, m.B, omega, period, edges, nodes, element, node, angle, delay, now, past, b, times, weight,
-        t.nodes, t.points, t.weights, t.ell, t.support, t.bary)
+        int(slot[-1]), outputs, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows, seen_at, seen_rows)
     return PeriodMap(matrix, problem.period, shown.reshape(probes, 2, matrix.shape[0]))
 
 

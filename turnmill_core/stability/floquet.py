@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse.linalg import ArpackNoConvergence, eigs
 
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.threads import one_thread
@@ -27,6 +28,8 @@ from turnmill_core.stability.threads import one_thread
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+LARGE = 300
+"""Size of a map beyond which only its leading multipliers are computed."""
 REAL_TOLERANCE = 1e-9
 """A multiplier counts as real when |Im| is below this times its magnitude."""
 
@@ -137,10 +140,19 @@ def verdict_from_map(matrix: Floats, displacement: Floats, period: float) -> Flo
     if not np.all(np.isfinite(matrix)):
         raise ValueError("the map over one period is not finite, expected finite numbers; take more steps")
     with one_thread():
-        mu = np.linalg.eigvals(matrix).astype(np.complex128)
+        mu = _leading(matrix) if len(matrix) > LARGE else np.linalg.eigvals(matrix).astype(np.complex128)
         leading = mu[np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))[0]]
         vector = eigenvector(matrix, complex(leading))
     return verdict(mu, displacement @ vector, period)
+
+
+def _leading(matrix: Floats, count: int = 8) -> Complexes:
+    """Eigenvalues of largest magnitude of a large matrix; all of them where Arnoldi's method does not converge."""
+    try:
+        found = eigs(matrix, k=count, v0=np.cos(np.arange(len(matrix))), ncv=60, return_eigenvectors=False)
+    except ArpackNoConvergence:
+        found = np.linalg.eigvals(matrix)
+    return np.asarray(found, dtype=np.complex128)
 
 
 def eigenvector(matrix: Floats, value: complex) -> Complexes:

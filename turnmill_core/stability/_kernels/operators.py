@@ -322,25 +322,11 @@ def apply_period(
 
 @njit(cache=True)
 def dense_map(
-    lam: Complexes, Ct: Complexes, Bt: Complexes, omega: float, period: float, edges: Floats, nodes: Ints,
-    element: Ints, node: Ints, angle: Floats, delay: Floats, now: Floats, past: Floats, b: Floats, probes: Floats,
-    probe_weight: Floats, tab_nodes: Floats, tab_points: Floats, tab_weights: Floats, tab_ell: Floats, support: Floats,
-    bary: Floats,
+    L: int, Ct: Complexes, nodes: Ints, node: Ints, now: Floats, slot: Ints, turn: Complexes, F: Floats, K: Floats,
+    R: Floats, LU: Floats, pivot: Ints, first: Ints, at: Ints, rows: Floats, seen_at: Ints, seen_rows: Floats,
 ) -> tuple[Floats, Floats]:
-    """Matrix (L, L) over one period and values (P, L) of probe_weight (P, q) . y at the angles `probes` (P,).
-
-    State: modal state (2 nb,), then for each channel past . y at the times before the period's start at which it is
-    needed, oldest first.
-    """
-    slot, seen = slots_of(angle, delay, period, 2 * lam.size)
-    turn, F, K, R, own, first = operators(
-        lam, Ct, Bt, omega, edges, nodes, element, node, now, b, tab_nodes, tab_points, tab_weights, tab_ell)
-    at, rows = sightings(seen, past, edges, nodes, omega, lam, Ct, support, bary)
-    seen_at, seen_rows = sightings(probes, probe_weight, edges, nodes, omega, lam, Ct, support, bary)
-    LU, pivot = np.empty_like(own), np.empty((own.shape[0], own.shape[1]), dtype=np.int64)
-    factors(1.0, own, first, LU, pivot)
-    L = slot[-1]
-    columns, shown, x = np.zeros((L, L)), np.zeros((L, probes.size)), np.zeros(L)
+    """Matrix (L, L) over one period and the probes' values (P, L); the other arguments as in apply_period."""
+    columns, shown, x = np.zeros((L, L)), np.zeros((L, seen_at.size)), np.zeros(L)
     for j in range(L):
         x[j] = 1.0
         apply_period(x, columns[j], 1.0, Ct, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows, seen_at,
