@@ -113,7 +113,7 @@ class Heard:
 
     touched: True where the tool cuts at some time in the window; ratios (n, 2): asynchronous and half-order energy over
     all energy of the judged channel without noise and tones, separated at the true speed; noise (n,): energy of
-    noise and tones over all energy.
+    noise and tones over all energy; samples: what the monitor heard.
     """
 
     case: Case
@@ -121,6 +121,7 @@ class Heard:
     touched: np.ndarray
     ratios: np.ndarray
     noise: np.ndarray
+    samples: np.ndarray
 
 
 def run(case: Case, **settings: object) -> Heard:
@@ -153,7 +154,7 @@ def run(case: Case, **settings: object) -> Heard:
         ratios.append((math.nan, math.nan) if moves else _ratios(case, clean[start:end], start))
         total = _energy(noisy[start:end], rate)
         noise.append(_energy(noisy[start:end] - clean[start:end], rate) / total if total > 0 else 1.0)
-    return Heard(case, tuple(verdicts), np.array(touched), np.array(ratios), np.array(noise))
+    return Heard(case, tuple(verdicts), np.array(touched), np.array(ratios), np.array(noise), noisy)
 
 
 def _steps(case: Case) -> list[float]:
