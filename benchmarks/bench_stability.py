@@ -2,9 +2,9 @@
 
     python benchmarks/bench_stability.py [--json]
 
-Medians of several runs on one core. The calibration loop (a fixed numpy job) tells how fast the machine is at the
-moment. "textbook" is the milling benchmark with two degrees of freedom, "case_1" thesis Table 4.9 with helix, round bar
-and delayed workpiece rotation.
+Medians of several runs, CPU time of one thread. The calibration loop (a fixed numpy job) tells how fast the machine is at
+the moment. "textbook" is the milling benchmark with two degrees of freedom, "case_1" thesis Table 4.9 with helix, round
+bar and delayed workpiece rotation.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ CASES = {"textbook": ("milling_benchmark_2dof", 5000, 25000, 2e-3), "case_1": ("
 
 
 def times(job: Callable[[], object], runs: int) -> list[float]:
-    """Times of `runs` runs [s], after one to warm up."""
+    """CPU times of `runs` runs [s], after one to warm up."""
     job()
     found = []
     for _ in range(runs):
-        begin = time.perf_counter()
+        begin = time.process_time()
         job()
-        found.append(time.perf_counter() - begin)
+        found.append(time.process_time() - begin)
     return found
 
 
@@ -50,13 +50,13 @@ def calibration() -> float:
 
 
 def margins(op: Operation, count: int) -> list[float]:
-    """Times [s] of live margins of slowly changing cuts, the search for another speed left out."""
+    """CPU times [s] of live margins of slowly changing cuts, the search for another speed left out."""
     found = []
     for k in range(count + 1):
         cut = with_cut(op, tool_speed=op.conditions.tool_speed * (1 + 1e-3 * k), depth=1e-3 * (1 + 5e-3 * k))
-        begin = time.perf_counter()
+        begin = time.process_time()
         stability_margin(op, cut, speed_search=False)
-        found.append(time.perf_counter() - begin)
+        found.append(time.process_time() - begin)
     return found[1:]
 
 

@@ -177,10 +177,12 @@ def column(
     for s in range(S):
         deepest = max(deepest, heights[s, -1])
     carried = np.zeros(1)
+    covered = 0.0
     for s in range(S):
-        if s == 0 or not proportional:
+        if heights[s, -1] > covered:
             depth = heights[s, -1]
-            rate = np.sqrt(fastest ** 2 + stiffening * (deepest if proportional else depth)) / omega
+            covered = min(deepest, max(1.5 * depth, 0.1 * deepest)) if proportional else depth
+            rate = np.sqrt(fastest ** 2 + stiffening * covered) / omega
             split = shift % period if abs(shift) > 0.02 and abs(lag) * depth < 0.1 else 0.0
             edges, nodes, origin = layout(
                 period, offsets, lag, heights[s], starts[s], stops[s], split,
@@ -195,6 +197,8 @@ def column(
             at, rows = sightings(seen, past, edges, nodes, omega, lam, Ct, support, bary)
             seen_at, seen_rows = sightings(none, nothing, edges, nodes, omega, lam, Ct, support, bary)
             LU, pivot = np.empty_like(own), np.empty((own.shape[0], own.shape[1]), dtype=np.int64)
+        if not proportional:
+            covered = 0.0
         scale = heights[s, -1] / depth
         factors(scale, own, first, LU, pivot)
         L = slot[-1]
@@ -207,6 +211,7 @@ def column(
         for i in range(L):
             V[0, i] /= size
         value, residual = 0.0 + 0.0j, 1.0
+        check, decay, step = min(5, L), 1.5, 1
         for m in range(1, min(MOST_STEPS, L) + 1):
             apply_period(V[m - 1], z, scale, Ct, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows,
                          seen_at, seen_rows, none)
@@ -223,10 +228,15 @@ def column(
             closed = m == min(MOST_STEPS, L) or H[m, m - 1] < 1e-13 * abs(H[0, 0])
             for i in range(L):
                 V[m, i] = z[i] / max(H[m, m - 1], 1e-300)
-            if closed or m == 5 or (m >= 8 and m % 3 == 2):
-                value = largest_eigenvalue(H[:m, :m])
+            if closed or m == check:
+                value, before = largest_eigenvalue(H[:m, :m]), residual
                 y = ritz_vector(H, m, value)
                 residual = 0.0 if m == L else abs(y[m - 1]) * H[m, m - 1]
+                if m > 5 and 0.0 < residual < before:  # the next check is where the residual should be small enough
+                    decay = min(max(np.log(before / residual) / step, 0.3), 3.0)
+                left = np.log(max(residual, 1e-300) / (tolerance * max(1.0, abs(value))))
+                step = min(max(int(np.ceil(left / decay)), 1), 5)
+                check = m + step
                 if closed or residual < tolerance * max(1.0, abs(value)):
                     carried = np.zeros(L)
                     for k in range(m):
