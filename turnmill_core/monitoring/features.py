@@ -40,17 +40,20 @@ LARGEST_RAMP = 0.01
 """Largest relative change of the speed over a window that is followed by the signal alone."""
 
 
+CANDIDATES = 4
+"""Strongest lines that are tried as H."""
+
 TURNING = 0.008
 """A line that turns faster than this against the tool [revolutions of phase per revolution] is asynchronous."""
 
 
 @dataclass(frozen=True)
 class ChatterFamily:
-    """Lines at H + i f_tooth.
+    """Lines at H + i f_tooth and, weaker or stronger, at 2 H and 3 H + i f_tooth.
 
-    frequency: H, the strongest [Hz]; energy: mean square of all lines; sidebands: lines found next
-    to H at a distance of one or two tooth passing frequencies; explained: share of the energy of all
-    asynchronous lines in lines at m H + i f_spindle; members [Hz], ascending.
+    frequency: H [Hz]; energy: mean square of all these lines; sidebands: lines found next to H at a
+    distance of one or two tooth passing frequencies; explained: share of the energy of all asynchronous
+    lines in them and at H + i f_spindle; members [Hz], ascending: the lines at H + i f_tooth.
     """
 
     frequency: float
@@ -82,7 +85,7 @@ class Features:
     number of tooth passing harmonics above the noise, of comb_of looked at; noise: broadband
     energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
     second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
-    family of the strongest, if any.
+    family that explains most of them, if any.
     """
 
     frequency: float
@@ -278,24 +281,35 @@ def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> boo
 
 def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spindle_frequency: float,
              lowest: float) -> ChatterFamily | None:
-    """Family of the strongest line, or None without lines."""
-    if not found:
-        return None
-    strongest = found[0].frequency
+    """Family that explains most of the lines' energy, of those that the strongest lines span; None without lines.
+
+    The strongest line need not be H: loss of contact makes lines at 2 H and 3 H too, and sound and
+    acceleration raise them.
+    """
+    families = [_family(s, found, x, tooth_frequency, spindle_frequency, lowest) for x in found[:CANDIDATES]]
+    return max(families, key=lambda c: round(c.explained, 1), default=None)
+
+
+def _family(s: Spectrum, found: tuple[Line, ...], first: Line, tooth_frequency: float, spindle_frequency: float,
+            lowest: float) -> ChatterFamily:
     top = (len(s.power) - 1) * s.step
     tolerance = 1.2 * s.resolution
-    members = family(strongest, tooth_frequency, top)
+    members = family(first.frequency, tooth_frequency, top)
     members = members[members >= lowest]
-    explained = np.concatenate([family(m * strongest, spindle_frequency, top) for m in (1, 2, 3)])
+    multiples = np.concatenate([members, *(family(m * first.frequency, tooth_frequency, top) for m in (2, 3))])
+    explained = np.concatenate([multiples, family(first.frequency, spindle_frequency, top)])
 
-    def belongs(x: Line, where: Array) -> bool:
-        return bool(np.min(np.abs(where - x.frequency), initial=math.inf) <= tolerance)
+    def energy(where: Array) -> float:
+        return sum(x.energy for x in found if _belongs(x, where, tolerance))
 
-    own = [x for x in found if belongs(x, members)]
     total = sum(x.energy for x in found)
-    next_to = np.abs(strongest + tooth_frequency * np.array([-2, -1, 1, 2]))
+    next_to = np.abs(first.frequency + tooth_frequency * np.array([-2, -1, 1, 2]))
     seen = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
     listed = np.array([any(abs(x.frequency - f) <= tolerance for x in found) for f in next_to])
-    return ChatterFamily(strongest, sum(x.energy for x in own), int((seen | listed).sum()),
-                         sum(x.energy for x in found if belongs(x, explained)) / total if total > 0 else 0.0,
-                         tuple(sorted(x.frequency for x in own)))
+    return ChatterFamily(first.frequency, energy(multiples), int((seen | listed).sum()),
+                         energy(explained) / total if total > 0 else 0.0,
+                         tuple(sorted(x.frequency for x in found if _belongs(x, members, tolerance))))
+
+
+def _belongs(x: Line, where: Array, tolerance: float) -> bool:
+    return bool(np.min(np.abs(where - x.frequency), initial=math.inf) <= tolerance)
