@@ -2,9 +2,9 @@
 
     python benchmarks/bench_stability.py [--json]
 
-Medians of several runs, CPU time of one thread. The calibration loop (a fixed numpy job) tells how fast the machine is at
-the moment. "textbook" is the milling benchmark with two degrees of freedom, "case_1" thesis Table 4.9 with helix, round
-bar and delayed workpiece rotation.
+Medians of several runs, CPU time of one thread. The calibration loop (a fixed numpy job) tells how fast the machine is
+at the moment. "textbook" is the milling benchmark with two degrees of freedom, "case_1" thesis Table 4.9 with helix,
+round bar and delayed workpiece rotation.
 """
 
 from __future__ import annotations

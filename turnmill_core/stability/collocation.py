@@ -16,6 +16,7 @@ teeth in the cut, pitch and delay; convergence is spectral in the number of node
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -171,8 +172,13 @@ def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes
 
 def _stiffening(problem: StabilityProblem) -> float:
     """Largest stiffening of a mode by the cut, per depth [1/(s2 m)]: it raises the frequencies to be resolved."""
-    s = problem.structure
-    return float(np.linalg.norm(problem.coefficients) * np.linalg.norm(s.C[:2] @ s.A @ s.B, 2))
+    return math.hypot(*problem.coefficients) * _mobility(problem.structure)
+
+
+@lru_cache(maxsize=64)
+def _mobility(structure: LinearStructure) -> float:
+    """Largest acceleration of the contact for a unit force [1/kg]."""
+    return float(np.linalg.norm(structure.C[:2] @ structure.A @ structure.B, 2))
 
 
 def _joined(problem: StabilityProblem) -> bool:

@@ -68,17 +68,20 @@ class FloquetVerdict:
     error: float = float("nan")
 
 
+def kinds(leading: ArrayLike) -> NDArray[np.uint8]:
+    """Values of PredictedType for leading multipliers of any shape, one for each point of a diagram."""
+    mu = np.asarray(leading, dtype=np.complex128)
+    flip = (mu.real < 0) & (np.abs(mu.imag) <= REAL_TOLERANCE * np.abs(mu))
+    unstable = np.where(flip, np.uint8(PredictedType.FLIP), np.uint8(PredictedType.HOPF))
+    return np.where(np.abs(mu) < 1, np.uint8(PredictedType.STABLE), unstable)
+
+
 def classify(multipliers: ArrayLike) -> PredictedType:
     """STABLE, HOPF or FLIP from multipliers (n,), any order. Raises ``ValueError`` when one is not finite."""
     mu = np.asarray(multipliers, dtype=np.complex128)
     if not np.all(np.isfinite(mu)):
         raise ValueError("a Floquet multiplier is not finite, expected finite multipliers; take more steps")
-    leading = mu[np.argmax(np.abs(mu))]
-    if abs(leading) < 1:
-        return PredictedType.STABLE
-    if leading.real < 0 and abs(leading.imag) <= REAL_TOLERANCE * abs(leading):
-        return PredictedType.FLIP
-    return PredictedType.HOPF
+    return PredictedType(int(kinds(mu[np.argmax(np.abs(mu))])))
 
 
 def chatter_family(multiplier: complex, period: float, highest: float) -> Floats:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Operation, require
-from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.delay import DelayModel
-from turnmill_core.stability.floquet import classify
+from turnmill_core.stability.floquet import kinds
 from turnmill_core.stability.operating_point import depth_family
 from turnmill_core.stability.search import stable_depths
 
@@ -56,14 +55,8 @@ def stability_lobes(
         multipliers[:, j] = family.multipliers(series, float(s))
         if progress is not None:
             progress(j + 1, speed.size)
-    radius = np.abs(multipliers)
-    kind = np.full(radius.shape, PredictedType.STABLE, dtype=np.uint8)
-    unstable = np.argwhere(radius >= 1)
-    for i, j in unstable:
-        kind[i, j] = classify(multipliers[i:i + 1, j])
-    slowest = float(np.linalg.eigvals(family.structure.A).real.max())
-    periods = series.problem.period * series.problem.tool_speed / speed
-    limit = lowest_limit(depth, np.log(radius), slowest * periods)
+    radius, kind = np.abs(multipliers), kinds(multipliers)
+    limit = lowest_limit(depth, np.log(radius), np.array([family.free_decay(float(s)) for s in speed]))
     return Lobes(conditions.workpiece_speed, speed, depth, radius, kind, limit)
 
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from turnmill_core.cutting import engagement as cutting_engagement
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation, Structure, require
-from turnmill_core.stability.collocation import DepthSeries, depth_series, series_multipliers
+from turnmill_core.stability.collocation import DepthSeries, depth_series, modal_blocks, series_multipliers
 from turnmill_core.stability.delay import DELAY_MODELS, DelayModel, delay_variation, mean_delay, tooth_period
 from turnmill_core.stability.problem import Engagement, StabilityProblem
-from turnmill_core.structure.modal import LinearStructure, modal_model, state_space
+from turnmill_core.structure.modal import LinearStructure, frozen_array, modal_model, state_space
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -82,6 +82,12 @@ class DepthFamily:
         """The problem at the deepest cut."""
         return self.problem(self.conditions.depth)
 
+    def free_decay(self, tool_speed: float | None = None) -> float:
+        """ln|mu| at depth 0, of the free structure, at tool_speed [rad/s] (None: the conditions')."""
+        p = self.deepest
+        angle = p.period * p.tool_speed
+        return float(modal_blocks(self.structure).lam.real.max() * angle / (tool_speed or p.tool_speed))
+
     def series(self, depths: Sequence[float] | Floats) -> DepthSeries:
         """The depths prepared for the fast solver."""
         return depth_series(self.deepest, *self.arcs(depths))
@@ -128,10 +134,16 @@ def depth_family(
 
 def _places(depth: float, kink: float) -> Floats:
     """Depths under a bar's surface [m], from `depth` to 0, finer towards the surface; `kink` [m] is one of them."""
-    lower = BAR_SLICES // 4 if 0 < kink < depth else 0
-    upper = kink if lower else depth
-    place = upper * (1 - np.arange(BAR_SLICES - lower + 1) / (BAR_SLICES - lower)) ** 2
-    return np.concatenate([np.linspace(depth, kink, lower + 1)[:-1], place]) if lower else place
+    if not 0 < kink < depth:
+        return depth * _falling(BAR_SLICES) ** 2
+    lower = BAR_SLICES // 4
+    return np.concatenate([kink + (depth - kink) * _falling(lower)[:-1], kink * _falling(BAR_SLICES - lower) ** 2])
+
+
+@lru_cache(maxsize=4)
+def _falling(intervals: int) -> Floats:
+    """Equally spaced numbers from 1 to 0, read-only."""
+    return frozen_array(np.linspace(1.0, 0.0, intervals + 1), "fractions", (-1,))
 
 
 def regeneration(op: Operation, conditions: Conditions, delay_model: DelayModel) -> tuple[tuple[float, ...], float]:

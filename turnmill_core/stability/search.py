@@ -28,7 +28,7 @@ def stable_depths(
     deepest = family.conditions.depth if searched is None else searched
     series = family.series(np.linspace(0.0, deepest, scan + 1)[1:]) if series is None else series
     depths = np.concatenate([[0.0], series.heights[:, -1]])
-    excess = np.concatenate([[-1.0], np.log(np.abs(family.multipliers(series, tool_speed)))])
+    excess = np.concatenate([[family.free_decay(tool_speed)], np.log(np.abs(family.multipliers(series, tool_speed)))])
     edges = [0.0]
     for i in np.flatnonzero((excess[:-1] < 0) != (excess[1:] < 0)):
         edges.append(crossing(family, tool_speed, depths[i:i + 2], excess[i:i + 2], tolerance))
