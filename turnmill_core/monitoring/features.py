@@ -24,7 +24,7 @@ from turnmill_core.monitoring.separation import (
     synchronous,
     uniform_in_time,
 )
-from turnmill_core.monitoring.spectrum import Array, Line, Spectrum, family, lines, near, spectrum
+from turnmill_core.monitoring.spectrum import Array, Line, Spectrum, lines, near, spectrum
 
 LINE_RATIO = 16.0
 """A peak counts as a line above this power over the floor: noise alone passes it once in about 500 windows."""
@@ -181,14 +181,15 @@ def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
     assumed = turns * ratio
     parts = _separate(p, assumed, steady, teeth, lowest)
     length = parts.layout.revolutions
+    found = _drift(parts, p, teeth)
     for _ in range(2):
-        error = float(np.clip(ratio * (1 + _drift(parts, p, teeth).speed), *band)) / ratio - 1
+        error = float(np.clip(ratio * (1 + found.speed), *band)) / ratio - 1
         if abs(error) * length * teeth < PHASE:
             break
         assumed, ratio = followed(assumed, length, Drift(error)), ratio * (1 + error)
         parts = _separate(p, assumed, steady, teeth, lowest)
-    for _ in range(2):
         found = _drift(parts, p, teeth)
+    for _ in range(2):
         ramp = min(LARGEST_RAMP / length, max(-LARGEST_RAMP / length, found.ramp))
         if abs(ramp) * length**2 / 4 * teeth < PHASE:
             break
@@ -197,6 +198,7 @@ def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
         if better.residual.power.sum() > 0.9 * parts.residual.power.sum():
             break
         parts = better
+        found = _drift(parts, p, teeth)
     return parts, ratio
 
 
@@ -292,24 +294,25 @@ def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spind
 
 def _family(s: Spectrum, found: tuple[Line, ...], first: Line, tooth_frequency: float, spindle_frequency: float,
             lowest: float) -> ChatterFamily:
-    top = (len(s.power) - 1) * s.step
     tolerance = 1.2 * s.resolution
-    members = family(first.frequency, tooth_frequency, top)
-    members = members[members >= lowest]
-    multiples = np.concatenate([members, *(family(m * first.frequency, tooth_frequency, top) for m in (2, 3))])
-    explained = np.concatenate([multiples, family(first.frequency, spindle_frequency, top)])
-
-    def energy(where: Array) -> float:
-        return sum(x.energy for x in found if _belongs(x, where, tolerance))
-
-    total = sum(x.energy for x in found)
+    frequency = np.array([x.frequency for x in found])
+    energy = np.array([x.energy for x in found])
+    own = _away(frequency, first.frequency, tooth_frequency) <= tolerance
+    multiples = own.copy()
+    for m in (2, 3):
+        multiples |= _away(frequency, m * first.frequency, tooth_frequency) <= tolerance
+    explained = multiples | (_away(frequency, first.frequency, spindle_frequency) <= tolerance)
+    total = float(energy.sum())
     next_to = np.abs(first.frequency + tooth_frequency * np.array([-2, -1, 1, 2]))
     seen = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
-    listed = np.array([any(abs(x.frequency - f) <= tolerance for x in found) for f in next_to])
-    return ChatterFamily(first.frequency, energy(multiples), int((seen | listed).sum()),
-                         energy(explained) / total if total > 0 else 0.0,
-                         tuple(sorted(x.frequency for x in found if _belongs(x, members, tolerance))))
+    seen |= np.abs(frequency[:, None] - next_to).min(axis=0) <= tolerance
+    return ChatterFamily(first.frequency, float(energy[multiples].sum()), int(seen.sum()),
+                         float(energy[explained].sum()) / total if total > 0 else 0.0,
+                         tuple(sorted(frequency[own & (frequency >= lowest)].tolist())))
 
 
-def _belongs(x: Line, where: Array, tolerance: float) -> bool:
-    return bool(np.min(np.abs(where - x.frequency), initial=math.inf) <= tolerance)
+def _away(frequency: Array, first: float, spacing: float) -> Array:
+    """Distance [Hz] of each frequency from the nearest of |first + i spacing|."""
+    up, down = (frequency - first) / spacing, (frequency + first) / spacing
+    found: Array = np.minimum(np.abs(up - np.rint(up)), np.abs(down - np.rint(down))) * spacing
+    return found

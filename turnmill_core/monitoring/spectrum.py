@@ -1,4 +1,4 @@
-"""Windowed spectra, their noise floor, lines and line families."""
+"""Windowed spectra, their noise floor and lines."""
 
 from __future__ import annotations
 
@@ -122,11 +122,4 @@ def near(values: Array, s: Spectrum, frequencies: Array, tolerance: float) -> Ar
     inside = (at >= reach) & (at < len(values) - reach)
     index = np.where(inside, at, reach)[..., None] + np.arange(-reach, reach + 1)
     found: Array = np.where(inside, values[np.minimum(index, len(values) - 1)].max(axis=-1), 0.0)
-    return found
-
-
-def family(first: float, spacing: float, top: float) -> Array:
-    """Frequencies |first + i spacing| up to `top` [Hz], ascending: a line, its sidebands and their mirror images."""
-    up = np.arange(-np.floor((top + first) / spacing), np.floor((top - first) / spacing) + 1)
-    found: Array = np.unique(np.abs(first + up * spacing))
     return found

@@ -69,9 +69,9 @@ def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: 
     the window or lie further apart than `longest_gap_ns`.
     """
     first = next((i for i in range(len(held) - 1, -1, -1) if held[i].stamp_ns <= start_ns), -1)
-    last = next((i for i in range(len(held)) if held[i].stamp_ns >= end_ns), -1)
-    if first < 0 or last < 0:
+    if first < 0 or held[-1].stamp_ns < end_ns:
         return None
+    last = next(i for i in range(first, len(held)) if held[i].stamp_ns >= end_ns)
     used = held[first: max(last, first + 1) + 1]
     if len(used) < 2:
         return constant_rotation(used[0].speed, count, rate)
