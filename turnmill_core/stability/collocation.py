@@ -156,17 +156,20 @@ def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes
         omega, c, friction, m.basis, lag, height, start, stop, *problem.coefficients)
     outputs = m.outputs(c > 0)
     slot, seen = operators.slots_of(angle, delay, period, 2 * m.lam.size)
-    turn, F, K, R, own, first = operators.operators(
+    turn, F, K, R, free, own, first = operators.operators(
         m.lam, outputs, m.B, omega, edges, nodes, element, node, now, b, t.nodes, t.points, t.weights, t.ell)
     at, rows = operators.sightings(seen, past, edges, nodes, omega, m.lam, outputs, t.support, t.bary)
+    operators.mark_own(at, seen, angle, now, past)
     times = np.repeat(period / max(probes, 1) * np.arange(probes), 2)
     weight = np.zeros((times.size, len(outputs)))
     weight[:, :m.basis.shape[1]] = np.tile(m.basis, (probes, 1))
     seen_at, seen_rows = operators.sightings(times, weight, edges, nodes, omega, m.lam, outputs, t.support, t.bary)
     LU, pivot = np.empty_like(own), np.empty(own.shape[:2], dtype=np.int64)
     operators.factors(1.0, own, first, LU, pivot)
+    wanted = operators.looked_into(at, seen_at, nodes.size)
     matrix, shown = operators.dense_map(
-        int(slot[-1]), outputs, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows, seen_at, seen_rows)
+        int(slot[-1]), outputs, nodes, slot, turn, F, K, R, free, LU, pivot, first, at, rows, seen_at, seen_rows,
+        wanted)
     return PeriodMap(matrix, problem.period, shown.reshape(probes, 2, matrix.shape[0]))
 
 

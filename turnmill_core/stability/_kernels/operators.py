@@ -11,6 +11,8 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
 REASSOCIATE = {"reassoc", "contract"}
+OWN = -2
+"""In place of an element: the past is the channel's own present value of an earlier period."""
 
 
 @njit(cache=True)
@@ -114,11 +116,11 @@ def slots_of(angle: Floats, delay: Floats, period: float, first: int) -> tuple[I
 def operators(
     lam: Complexes, Ct: Complexes, Bt: Complexes, omega: float, edges: Floats, nodes: Ints, element: Ints, node: Ints,
     now: Floats, b: Floats, tab_nodes: Floats, tab_points: Floats, tab_weights: Floats, tab_ell: Floats,
-) -> tuple[Complexes, Floats, Floats, Floats, Floats, Ints]:
-    """Operators of all elements, padded: turn (E, nb), F (E, q n, 2 nb), K (E, q n, H), R (E, 2 nb, H), own (E, H, H).
+) -> tuple[Complexes, Floats, Floats, Floats, Floats, Floats, Ints]:
+    """Operators of all elements, padded: turn (E, nb), F (E, q n, 2 nb), K (E, q n, H), R (E, 2 nb, H).
 
-    own: from the channels of an element to their own now . y. The last value, first (E + 1,), says that the channels
-    of element e are first[e] to first[e + 1].
+    Then, for the channels' own now . y, free (E, H, 2 nb) from the modal state at the start and own (E, H, H) from the
+    channels. The last value, first (E + 1,), says that the channels of element e are first[e] to first[e + 1].
     """
     nb, rows, E = lam.size, Ct.shape[0], nodes.size
     first = np.zeros(E + 1, dtype=np.int64)
@@ -131,7 +133,7 @@ def operators(
         first[e + 1] += first[e]
     turn = np.empty((E, nb), dtype=np.complex128)
     F, K = np.zeros((E, rows * most, 2 * nb)), np.zeros((E, rows * most, wide))
-    R, own = np.zeros((E, 2 * nb, wide)), np.zeros((E, wide, wide))
+    R, own, free = np.zeros((E, 2 * nb, wide)), np.zeros((E, wide, wide)), np.zeros((E, wide, 2 * nb))
     per_gap = tab_points.shape[1] // tab_nodes.shape[1]
     for e in range(E):
         duration = (edges[e + 1] - edges[e]) / omega
@@ -146,10 +148,13 @@ def operators(
         for i in range(h1 - h0):
             for a in range(rows):
                 weight = now[h0 + i, a]
+                row = a * n + node[h0 + i]
                 if weight != 0.0:
                     for j in range(h1 - h0):
-                        own[e, i, j] += weight * K[e, a * n + node[h0 + i], j]
-    return turn, F, K, R, own, first
+                        own[e, i, j] += weight * K[e, row, j]
+                    for k in range(2 * nb):
+                        free[e, i, k] += weight * F[e, row, k]
+    return turn, F, K, R, free, own, first
 
 
 @njit(cache=True)
@@ -189,6 +194,29 @@ def sightings(
             for a in range(rows):
                 found[s, i * rows + a] = row[i] * weight[s, a]
     return at, found
+
+
+@njit(cache=True)
+def mark_own(at: Ints, seen: Floats, angle: Floats, now: Floats, past: Floats) -> None:
+    """Set at[h] to OWN for every channel whose past is its own present value of an earlier period, in place."""
+    for h in range(at.size):
+        same = at[h] >= 0 and abs(seen[h] - angle[h]) < 1e-12
+        for a in range(now.shape[1]):
+            same = same and now[h, a] == past[h, a]
+        if same:
+            at[h] = OWN
+
+
+@njit(cache=True)
+def looked_into(at: Ints, seen_at: Ints, E: int) -> Ints:
+    """1 for each element (E,) of which the contact values are wanted between its channels."""
+    wanted = np.zeros(E, dtype=np.int64)
+    for e in at:
+        if e >= 0:
+            wanted[e] = 1
+    for e in seen_at:
+        wanted[e] = 1
+    return wanted
 
 
 @njit(cache=True)
@@ -261,16 +289,16 @@ def read_contact(Ct: Complexes, X: Floats, out: Floats) -> None:
 
 @njit(cache=True)
 def apply_period(
-    x: Floats, out: Floats, scale: float, Ct: Complexes, nodes: Ints, node: Ints, now: Floats, slot: Ints,
-    turn: Complexes, F: Floats, K: Floats, R: Floats, LU: Floats, pivot: Ints, first: Ints, at: Ints, rows: Floats,
-    seen_at: Ints, seen_rows: Floats, shown: Floats,
+    x: Floats, out: Floats, scale: float, Ct: Complexes, nodes: Ints, slot: Ints, turn: Complexes, F: Floats, K: Floats,
+    R: Floats, free: Floats, LU: Floats, pivot: Ints, first: Ints, at: Ints, rows: Floats, seen_at: Ints,
+    seen_rows: Floats, wanted: Ints, shown: Floats,
 ) -> None:
     """out (L,): the state x (L,) one principal period later; shown (P,): the probes' values on the way.
 
     scale: factor on all forces. LU, pivot: factors of 1 - scale own. at, rows: sightings of the channels' pasts;
-    seen_at, seen_rows: of the probes.
+    seen_at, seen_rows: of the probes; wanted: looked_into.
     """
-    q, nb, E, H = Ct.shape[0], Ct.shape[1], nodes.size, node.size
+    q, nb, E, H = Ct.shape[0], Ct.shape[1], nodes.size, at.size
     X = x[:2 * nb].copy()
     before = np.empty(2 * nb)
     inside = np.zeros(H)
@@ -278,22 +306,24 @@ def apply_period(
         for s in range(slot[h], slot[h + 1] - 1):
             out[s] = x[s + 1]
     y = np.empty((F.shape[1] // q + 2) * q)
-    chip, free = np.empty(K.shape[2]), np.empty(F.shape[1])
+    chip = np.empty(K.shape[2])
     for e in range(E):
         n, h0, h1 = nodes[e], first[e], first[e + 1]
         known, width = before, 2 * nb
         if n > 0:
-            for i in range(q * n):
-                free[i] = inner(F[e, i], X, 2 * nb)
             for h in range(h0, h1):
-                chip[h - h0] = -x[slot[h]] if slot[h + 1] > slot[h] else -inside[h]
-                for a in range(q):
-                    chip[h - h0] += now[h, a] * free[a * n + node[h]]
+                met = x[slot[h]] if slot[h + 1] > slot[h] else inside[h]
+                chip[h - h0] = inner(free[e, h - h0], X, 2 * nb) - met
             substitute(LU[e], pivot[e, :h1 - h0], chip)
-            for i in range(n):
-                for a in range(q):
-                    y[(i + 1) * q + a] = free[a * n + i] + scale * inner(K[e, a * n + i], chip, h1 - h0)
-            read_contact(Ct, X, y[:q])
+            for h in range(h0, h1):
+                if at[h] == OWN:  # now . y is the chip thickness and what was met
+                    out[slot[h + 1] - 1] = chip[h - h0] + x[slot[h]]
+            if wanted[e] == 1:
+                for i in range(n):
+                    for a in range(q):
+                        y[(i + 1) * q + a] = inner(F[e, a * n + i], X, 2 * nb) + scale * inner(
+                            K[e, a * n + i], chip, h1 - h0)
+                read_contact(Ct, X, y[:q])
             known, width = y, (n + 2) * q
         else:
             for k in range(2 * nb):
@@ -305,7 +335,10 @@ def apply_period(
         if n > 0:
             for k in range(2 * nb):
                 X[k] += scale * inner(R[e, k], chip, h1 - h0)
-            read_contact(Ct, X, y[(n + 1) * q:(n + 2) * q])
+            if wanted[e] == 1:
+                read_contact(Ct, X, y[(n + 1) * q:(n + 2) * q])
+        if wanted[e] == 0:
+            continue
         for h in range(H):
             if at[h] == e:
                 value = inner(rows[h], known, width)
@@ -322,14 +355,14 @@ def apply_period(
 
 @njit(cache=True)
 def dense_map(
-    L: int, Ct: Complexes, nodes: Ints, node: Ints, now: Floats, slot: Ints, turn: Complexes, F: Floats, K: Floats,
-    R: Floats, LU: Floats, pivot: Ints, first: Ints, at: Ints, rows: Floats, seen_at: Ints, seen_rows: Floats,
+    L: int, Ct: Complexes, nodes: Ints, slot: Ints, turn: Complexes, F: Floats, K: Floats, R: Floats, free: Floats,
+    LU: Floats, pivot: Ints, first: Ints, at: Ints, rows: Floats, seen_at: Ints, seen_rows: Floats, wanted: Ints,
 ) -> tuple[Floats, Floats]:
     """Matrix (L, L) over one period and the probes' values (P, L); the other arguments as in apply_period."""
     columns, shown, x = np.zeros((L, L)), np.zeros((L, seen_at.size)), np.zeros(L)
     for j in range(L):
         x[j] = 1.0
-        apply_period(x, columns[j], 1.0, Ct, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows, seen_at,
-                     seen_rows, shown[j])
+        apply_period(x, columns[j], 1.0, Ct, nodes, slot, turn, F, K, R, free, LU, pivot, first, at, rows, seen_at,
+                     seen_rows, wanted, shown[j])
         x[j] = 0.0
     return columns.T.copy(), shown.T.copy()

@@ -7,7 +7,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from turnmill_core.stability._kernels.cut import channels, layout
-from turnmill_core.stability._kernels.operators import apply_period, factors, inner, operators, sightings, slots_of
+from turnmill_core.stability._kernels.operators import (
+    apply_period,
+    factors,
+    inner,
+    looked_into,
+    mark_own,
+    operators,
+    sightings,
+    slots_of,
+)
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -192,10 +201,12 @@ def column(
                 edges, nodes, origin, tab_nodes, offsets, delays, variation[s], joined, rotating, omega, damping,
                 friction, basis, lag, heights[s], starts[s], stops[s], Ktc, Krc, Kac)
             slot, seen = slots_of(angle, delay, period, 2 * lam.size)
-            turn, F, K, R, own, first = operators(
+            turn, F, K, R, free, own, first = operators(
                 lam, Ct, Bt, omega, edges, nodes, element, node, now, b, tab_nodes, tab_points, tab_weights, tab_ell)
             at, rows = sightings(seen, past, edges, nodes, omega, lam, Ct, support, bary)
+            mark_own(at, seen, angle, now, past)
             seen_at, seen_rows = sightings(none, nothing, edges, nodes, omega, lam, Ct, support, bary)
+            wanted = looked_into(at, seen_at, nodes.size)
             LU, pivot = np.empty_like(own), np.empty((own.shape[0], own.shape[1]), dtype=np.int64)
         if not proportional:
             covered = 0.0
@@ -213,8 +224,8 @@ def column(
         value, residual = 0.0 + 0.0j, 1.0
         check, decay, step = min(5, L), 1.5, 1
         for m in range(1, min(MOST_STEPS, L) + 1):
-            apply_period(V[m - 1], z, scale, Ct, nodes, node, now, slot, turn, F, K, R, LU, pivot, first, at, rows,
-                         seen_at, seen_rows, none)
+            apply_period(V[m - 1], z, scale, Ct, nodes, slot, turn, F, K, R, free, LU, pivot, first, at, rows, seen_at,
+                         seen_rows, wanted, none)
             size = np.sqrt(inner(z, z, L))
             for again in range(2):
                 for k in range(m):
