@@ -17,7 +17,7 @@ import numpy as np
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
-from turnmill_core.process import _kernels
+from turnmill_core.process._kernels import integrator
 from turnmill_core.process.scenarios import SCENARIOS
 from turnmill_core.process.simulation import SimulationConfig, initial, simulate, step
 
@@ -50,7 +50,7 @@ def real_time_factor(op: Operation, config: SimulationConfig, duration: float, r
 def kernel_share(op: Operation, config: SimulationConfig, duration: float) -> float:
     """Share of the processor time of `step` that the integrator takes."""
     spent = [0.0]
-    advance = _kernels.advance
+    advance = integrator.advance
 
     def timed(*arguments: object) -> int:
         begin = time.process_time()
@@ -62,12 +62,12 @@ def kernel_share(op: Operation, config: SimulationConfig, duration: float) -> fl
     axes = [axis_state_at(op, i / config.axes_rate, round(i * 1e9 / config.axes_rate))
             for i in range(int(duration * config.axes_rate))]
     state = initial(op, config, 0)
-    _kernels.advance = timed
+    integrator.advance = timed
     begin = time.process_time()
     for i in range(0, len(axes), per_block):
         state, _ = step(config, state, axes[i : i + per_block])
     total = time.process_time() - begin
-    _kernels.advance = advance
+    integrator.advance = advance
     return spent[0] / total
 
 

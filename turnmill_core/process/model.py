@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from turnmill_core.machine.axes import AXES, AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool
 from turnmill_core.operation import Conditions, Mode, Operation
-from turnmill_core.process import _kernels
+from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.sensors import SoundModel, antialias_taps
 from turnmill_core.process.truth import principal_turns
@@ -29,7 +29,7 @@ TRUTH_HOP = 0.03  # s, about
 class ProcessModel:
     """Operation and configuration as the integrator wants them.
 
-    dt [s]; modes (M, 16): see _kernels; tooth_angle, pitch [rad], runout [m] (teeth,); shape (4,):
+    dt [s]; modes (M, 16): see _kernels.integrator; tooth_angle, pitch [rad], runout [m] (teeth,); shape (4,):
     radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m], longest pitch [rad];
     coefficients (6,): Ktc, Krc, Kac [Pa], and Kte, Kre, Kae per height instead of per edge length
     [N/m]; slices, cells of the surface; taps: anti-alias filter; columns: of the raw signals, one per
@@ -74,7 +74,7 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         coefficients=np.array([material.Ktc, material.Krc, material.Kac, *edge]),
         slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
-        taps=antialias_taps(config.ratio), columns=tuple(_kernels.RAW.index(name) for name in config.channels),
+        taps=antialias_taps(config.ratio), columns=tuple(integrator.RAW.index(name) for name in config.channels),
         teeth=tool.teeth, turns=principal_turns(tool),
         uneven=bool(np.ptp(pitch) > 1e-9),
         hop=max(1, round(TRUTH_HOP * op.conditions.tool_speed / (2 * math.pi * principal_turns(tool)))),
@@ -82,20 +82,20 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
 
 
 def knot(model: ProcessModel, axes: AxisState, base_ns: int) -> Floats:
-    """One row of _kernels.advance's knots from an axis state: what the cut looks like at that instant."""
+    """One row of integrator.advance's knots from an axis state: what the cut looks like at that instant."""
     op = model.op
     conditions = conditions_from_axes(op, axes)
-    row = np.zeros(_kernels.KNOT_COLUMNS)
-    row[_kernels.TIME] = (axes.stamp_ns - base_ns) * 1e-9
-    row[_kernels.TOOL_ANGLE] = axes.position[SPINDLE]
-    row[_kernels.TOOL_SPEED] = conditions.tool_speed
+    row = np.zeros(integrator.KNOT_COLUMNS)
+    row[integrator.TIME] = (axes.stamp_ns - base_ns) * 1e-9
+    row[integrator.TOOL_ANGLE] = axes.position[SPINDLE]
+    row[integrator.TOOL_SPEED] = conditions.tool_speed
     if conditions.tool_speed > 0:
-        row[_kernels.SLIP] = abs(conditions.workpiece_speed) / conditions.tool_speed
-    row[_kernels.DEPTH] = conditions.depth
+        row[integrator.SLIP] = abs(conditions.workpiece_speed) / conditions.tool_speed
+    row[integrator.DEPTH] = conditions.depth
     tip, top = _arc(op, conditions, 0.0), _arc(op, conditions, max(1e-6, conditions.depth))
     slope = [(b - a) / max(1e-6, conditions.depth) for a, b in zip(tip, top, strict=True)]
-    row[_kernels.FEED_X], row[_kernels.FEED_Y], row[_kernels.START], row[_kernels.EXIT] = tip
-    row[_kernels.FEED_X_SLOPE], _, row[_kernels.START_SLOPE], row[_kernels.EXIT_SLOPE] = slope
+    row[integrator.FEED_X], row[integrator.FEED_Y], row[integrator.START], row[integrator.EXIT] = tip
+    row[integrator.FEED_X_SLOPE], _, row[integrator.START_SLOPE], row[integrator.EXIT_SLOPE] = slope
     return row
 
 
@@ -140,7 +140,7 @@ def _crossing(wall: float, radius: float, lever: float, lead: float, epsilon: fl
 
 
 def _modes(op: Operation, sound: SoundModel, dt: float) -> Floats:
-    """Rows of _kernels.advance's modes: tool, workpiece, then the panels that only radiate."""
+    """Rows of integrator.advance's modes: tool, workpiece, then the panels that only radiate."""
     rotation = machine_from_tool(op, op.conditions)
     direction = np.array(sound.direction)
     rows = []
@@ -152,7 +152,7 @@ def _modes(op: Operation, sound: SoundModel, dt: float) -> Floats:
             rows.append(_row(mode, side * shape, side, sound.radiation(area) * float(shape @ direction), dt))
     for panel in sound.panels:
         rows.append(_row(panel, np.array(panel.shape), 0.0, sound.radiation(sound.panel_area), dt))
-    return np.array(rows).reshape(-1, _kernels.MODE_COLUMNS)
+    return np.array(rows).reshape(-1, integrator.MODE_COLUMNS)
 
 
 def _row(mode: Mode, shape: Floats, side: float, radiation: float, dt: float) -> Floats:
@@ -167,12 +167,12 @@ def _row(mode: Mode, shape: Floats, side: float, radiation: float, dt: float) ->
     system[1, :3] = -(w**2), -2 * mode.damping * w, 1 / mode.mass
     system[2, 3] = 1.0
     flow = expm(system * dt)
-    row = np.zeros(_kernels.MODE_COLUMNS)
-    row[_kernels.A11], row[_kernels.A12], row[_kernels.A21], row[_kernels.A22] = flow[:2, :2].ravel()
-    row[_kernels.C1], row[_kernels.C2] = flow[:2, 3] / dt
-    row[_kernels.B1], row[_kernels.B2] = flow[:2, 2] - flow[:2, 3] / dt
-    row[_kernels.STIFFNESS], row[_kernels.DAMPING] = mode.stiffness, 2 * mode.damping * w * mode.mass
-    row[_kernels.INVERSE_MASS] = 1 / mode.mass
-    row[_kernels.SHAPE_X : _kernels.SHAPE_Z + 1] = shape
-    row[_kernels.SIDE], row[_kernels.RADIATION] = side, radiation
+    row = np.zeros(integrator.MODE_COLUMNS)
+    row[integrator.A11], row[integrator.A12], row[integrator.A21], row[integrator.A22] = flow[:2, :2].ravel()
+    row[integrator.C1], row[integrator.C2] = flow[:2, 3] / dt
+    row[integrator.B1], row[integrator.B2] = flow[:2, 2] - flow[:2, 3] / dt
+    row[integrator.STIFFNESS], row[integrator.DAMPING] = mode.stiffness, 2 * mode.damping * w * mode.mass
+    row[integrator.INVERSE_MASS] = 1 / mode.mass
+    row[integrator.SHAPE_X : integrator.SHAPE_Z + 1] = shape
+    row[integrator.SIDE], row[integrator.RADIATION] = side, radiation
     return row

@@ -23,7 +23,7 @@ from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.controller import axis_state_at, schedule_duration
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.operation import Operation, require
-from turnmill_core.process import _kernels
+from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.model import ProcessModel, knot, process_model
 from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
@@ -40,7 +40,7 @@ class SimulationState:
 
     steps: index of the last integration step; base_ns: stamp of step 0; knot: last axis state as the
     integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (5,), surface
-    (teeth, slices, cells, 2): see _kernels.advance; rows: raw signals that the anti-alias filter still
+    (teeth, slices, cells, 2): see integrator.advance; rows: raw signals that the anti-alias filter still
     needs; next_sample: the sample that they centre on; samples: measured but not yet in a block;
     next_block: index of the block's first sample; background: last value of the noise filter; marks:
     displacements that the truth still needs, from the mark with index `mark_count` on.
@@ -90,9 +90,9 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
     surface = np.zeros((model.teeth, model.slices, model.cells * (2 if model.teeth == 1 else 1), 2))
     half = len(model.taps) // 2
     return SimulationState(
-        model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, _kernels.KNOT_COLUMNS)), modal=start,
-        force=np.zeros(3), scalars=np.zeros(_kernels.SCALARS), surface=surface,
-        rows=np.zeros((half, len(_kernels.RAW))), next_sample=0,
+        model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, integrator.KNOT_COLUMNS)), modal=start,
+        force=np.zeros(3), scalars=np.zeros(integrator.SCALARS), surface=surface,
+        rows=np.zeros((half, len(integrator.RAW))), next_sample=0,
         samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
         marks=np.zeros((0, 4)), first_mark_skip=-1,
     )
@@ -112,7 +112,7 @@ def step(
         return state, Chunk((), (), join_truth(()))
     base_ns = state.base_ns if len(state.knot) else chunk[0].stamp_ns
     knots = np.concatenate([state.knot, *(knot(state.model, a, base_ns)[None, :] for a in chunk)])
-    stamps = knots[:, _kernels.TIME]
+    stamps = knots[:, integrator.TIME]
     if np.any(np.diff(stamps) <= 0):
         at = int(np.argmax(np.diff(stamps) <= 0))
         raise ValueError(f"axis state stamp is {stamps[at + 1]} s since the start, after one at {stamps[at]} s, "
@@ -154,14 +154,14 @@ def simulate(
 
 def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationState:
     """State at the first axis state: angles set, one row of raw signals at time 0."""
-    next_mark = math.floor(first[_kernels.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
-    scalars = np.array([first[_kernels.TOOL_ANGLE], 0.0, max(0.0, first[_kernels.DEPTH]), 0.0, next_mark])
-    row = np.zeros((1, len(_kernels.RAW)))
-    row[0, 0] = first[_kernels.TOOL_ANGLE]
+    next_mark = math.floor(first[integrator.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
+    scalars = np.array([first[integrator.TOOL_ANGLE], 0.0, max(0.0, first[integrator.DEPTH]), 0.0, next_mark])
+    row = np.zeros((1, len(integrator.RAW)))
+    row[0, 0] = first[integrator.TOOL_ANGLE]
     modes = state.model.modes
     for side, column in ((1.0, 2), (-1.0, 5)):
-        chosen = modes[:, _kernels.SIDE] == side
-        shapes = side * modes[chosen][:, _kernels.SHAPE_X : _kernels.SHAPE_Z + 1]
+        chosen = modes[:, integrator.SIDE] == side
+        shapes = side * modes[chosen][:, integrator.SHAPE_X : integrator.SHAPE_Z + 1]
         row[0, column : column + 3] = state.modal[chosen, 0] @ shapes
     period = MARKS_PER_TURN * state.model.turns
     return replace(state, base_ns=base_ns, scalars=scalars, rows=np.concatenate([state.rows, row]),
@@ -172,18 +172,18 @@ def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) 
     """Run the kernel to the last knot; the marks that it wrote."""
     model = state.model
     dt = model.dt
-    last = knots[-1, _kernels.TIME] + _kernels.TIME_TOLERANCE
+    last = knots[-1, integrator.TIME] + integrator.TIME_TOLERANCE
     end = int(last / dt) + 1
     while end * dt > last:
         end -= 1
     count = max(0, end - state.steps) if len(knots) > 1 else 0
-    raw = np.empty((count, len(_kernels.RAW)))
-    turned = float(knots[:, _kernels.TOOL_ANGLE].max() - state.scalars[_kernels.ANGLE])
+    raw = np.empty((count, len(integrator.RAW)))
+    turned = float(knots[:, integrator.TOOL_ANGLE].max() - state.scalars[integrator.ANGLE])
     marks = np.empty((int(max(0.0, turned) * MARKS_PER_TURN / (2 * math.pi)) + count + 2, 4))
     modal, force, scalars, surface = (a.copy() for a in (state.modal, state.force, state.scalars, state.surface))
     written = 0
     if count:
-        written = _kernels.advance(
+        written = integrator.advance(
             state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
             model.coefficients, config.loss_of_contact, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
         )
@@ -231,7 +231,7 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
     used[:, : len(taken)] = taken.T
     phases = np.ascontiguousarray(used.reshape(len(model.columns), length, ratio).transpose(0, 2, 1))
     filtered = np.empty((len(model.columns), count))
-    _kernels.decimate(phases, model.taps, filtered)
+    integrator.decimate(phases, model.taps, filtered)
     signals = filtered.T.copy()
     background = state.background
     for c, name in enumerate(config.channels):

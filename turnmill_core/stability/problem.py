@@ -12,6 +12,7 @@ phi = phi_tip - lag z. Equal present and past states give no force (erratum D10)
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,9 +153,21 @@ def directional_matrix(
     (Ktc, Krc, Kac): others than the problem's, for instance of process damping.
     """
     tip = np.mod(np.asarray(angle, dtype=np.float64), TWO_PI)
-    e, lag = problem.engagement, problem.helix_lag
-    low, span = e.height[:-1], np.diff(e.height)
     out = np.zeros((tip.size, 3, 2))
+    for phi, low, high in engaged_pieces(problem, tip):
+        middle = phi - problem.helix_lag * 0.5 * (low + high)
+        out += _integrated(middle, high - low, problem.helix_lag, coefficients or problem.coefficients)
+    return out
+
+
+def engaged_pieces(problem: StabilityProblem, tip: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Pieces of one tooth's edge that are in the cut, its tip at `tip` [rad] (k,), in [0, 2 pi).
+
+    Yields, for every arc and turn, the tip's angle (k, 1) [rad] and the heights (k, m) [m] from which to which the
+    edge cuts in each of the engagement's m height intervals; equal where it does not.
+    """
+    e, lag = problem.engagement, problem.helix_lag
+    below, span = e.height[:-1], np.diff(e.height)
     for start, stop in zip(e.start.T, e.exit.T, strict=True):
         if not np.any(stop > start):
             continue
@@ -164,11 +177,8 @@ def directional_matrix(
             # fractions of each height interval where start(z) <= tip - lag z <= exit(z): two linear inequalities
             lo1, hi1 = _where_negative(entry[:-1] - phi, entry[1:] - phi)
             lo2, hi2 = _where_negative(phi - leave[:-1], phi - leave[1:])
-            a, b = np.maximum(lo1, lo2), np.minimum(hi1, hi2)
-            length = np.maximum(b - a, 0.0) * span
-            middle = phi - lag * (low + 0.5 * (a + b) * span)
-            out += _integrated(middle, length, lag, coefficients or problem.coefficients)
-    return out
+            low, high = np.maximum(lo1, lo2), np.minimum(hi1, hi2)
+            yield phi, below + low * span, below + np.maximum(high, low) * span
 
 
 def _where_negative(left: Floats, right: Floats) -> tuple[Floats, Floats]:

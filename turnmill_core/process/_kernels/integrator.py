@@ -1,4 +1,4 @@
-"""Compiled loops of the process simulator; everything else in this room is plain Python.
+"""Compiled loops of the process simulator: the nonlinear cut, and what its sensors do.
 
 `advance.py_func` is the plain version of the integrator; tests/process compare the two bit by bit,
 and hold both against independent solutions.
