@@ -15,68 +15,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-Frame = Literal["machine", "tool"]
+from .operation_checks import finite, not_negative, positive, require
+from .operation_structure import RIGID, RIGID_IN_MACHINE, Frame, Mode, Structure, Vector
+
+__all__ = [
+    "RIGID", "Conditions", "Frame", "Material", "Mode", "Operation", "Process", "SchedulePoint", "Structure", "Tool",
+    "Vector", "Workpiece", "require",
+]
+
 Process = Literal["milling", "turn-milling"]
-Vector = tuple[float, float, float]
-
-
-def require(ok: bool, name: str, value: object, unit: str, bound: str) -> None:
-    """Raise ``ValueError`` naming field, value, unit and bound unless `ok`."""
-    if not ok:
-        shown = f"{value!r} {unit}".rstrip()
-        raise ValueError(f"{name} is {shown}, expected {bound}")
-
-
-def _finite(name: str, value: float, unit: str) -> None:
-    require(math.isfinite(value), name, value, unit, "a finite number")
-
-
-def _positive(name: str, value: float, unit: str) -> None:
-    require(math.isfinite(value) and value > 0, name, value, unit, "a finite number > 0")
-
-
-def _not_negative(name: str, value: float, unit: str) -> None:
-    require(math.isfinite(value) and value >= 0, name, value, unit, "a finite number >= 0")
-
-
-@dataclass(frozen=True)
-class Mode:
-    """One vibration mode at the cutting point.
-
-    frequency: undamped natural frequency [Hz]; damping: viscous damping ratio [1];
-    mass: modal mass [kg] for `shape`; shape: mode shape at the cutting point [1], in the frame of
-    the structure that holds the mode. A direct mode in x has shape (1, 0, 0).
-    """
-
-    frequency: float
-    damping: float
-    mass: float
-    shape: Vector
-
-    def __post_init__(self) -> None:
-        _positive("mode frequency", self.frequency, "Hz")
-        require(0 < self.damping < 1, "mode damping", self.damping, "", "a ratio in (0, 1)")
-        _positive("mode mass", self.mass, "kg")
-        require(
-            all(math.isfinite(s) for s in self.shape) and any(s != 0 for s in self.shape),
-            "mode shape", self.shape, "", "three finite numbers, not all zero",
-        )
-
-    @property
-    def stiffness(self) -> float:
-        """Modal stiffness [N/m]."""
-        return self.mass * (2 * math.pi * self.frequency) ** 2
-
-
-@dataclass(frozen=True)
-class Structure:
-    """Vibration modes of the tool or of the workpiece at the cutting point; no modes: rigid."""
-
-    modes: tuple[Mode, ...] = ()
-    frame: Frame = "tool"
-
-
-RIGID = Structure()
 
 
 @dataclass(frozen=True)
@@ -98,7 +45,7 @@ class Tool:
     structure: Structure = RIGID
 
     def __post_init__(self) -> None:
-        _positive("tool diameter", self.diameter, "m")
+        positive("tool diameter", self.diameter, "m")
         require(self.teeth >= 1, "tool teeth", self.teeth, "", "an integer >= 1")
         require(abs(self.helix_angle) < math.pi / 2, "tool helix angle", self.helix_angle, "rad", "|angle| < pi/2")
         require(self.flute_length > 0, "tool flute length", self.flute_length, "m", "a number > 0")
@@ -141,17 +88,17 @@ class Workpiece:
     width: float = 0.0
     height: float = 0.0
     datum: Vector = (0.0, 0.0, 0.0)
-    structure: Structure = Structure(frame="machine")
+    structure: Structure = RIGID_IN_MACHINE
 
     def __post_init__(self) -> None:
-        _positive("workpiece length", self.length, "m")
+        positive("workpiece length", self.length, "m")
         if self.is_bar:
-            _positive("workpiece diameter", self.diameter, "m")
+            positive("workpiece diameter", self.diameter, "m")
             require(self.width == 0 and self.height == 0, "workpiece", (self.width, self.height), "m",
                     "either a diameter (bar) or width and height (block)")
         else:
-            _positive("workpiece width", self.width, "m")
-            _positive("workpiece height", self.height, "m")
+            positive("workpiece width", self.width, "m")
+            positive("workpiece height", self.height, "m")
         require(all(map(math.isfinite, self.datum)), "workpiece datum", self.datum, "m", "three finite numbers")
 
     @property
@@ -178,11 +125,11 @@ class Material:
     Kae: float = 0.0
 
     def __post_init__(self) -> None:
-        _positive("Ktc", self.Ktc, "Pa")
+        positive("Ktc", self.Ktc, "Pa")
         for name in ("Krc", "Kac"):
-            _finite(name, getattr(self, name), "Pa")
+            finite(name, getattr(self, name), "Pa")
         for name in ("Kte", "Kre", "Kae"):
-            _not_negative(name, getattr(self, name), "N/m")
+            not_negative(name, getattr(self, name), "N/m")
 
 
 @dataclass(frozen=True)
@@ -208,11 +155,11 @@ class Conditions:
     effective_radius: float = 0.0
 
     def __post_init__(self) -> None:
-        _not_negative("tool speed", self.tool_speed, "rad/s")
-        _finite("workpiece speed", self.workpiece_speed, "rad/s")
-        _finite("depth", self.depth, "m")
-        _not_negative("feed speed", self.feed_speed, "m/s")
-        _not_negative("effective radius", self.effective_radius, "m")
+        not_negative("tool speed", self.tool_speed, "rad/s")
+        finite("workpiece speed", self.workpiece_speed, "rad/s")
+        finite("depth", self.depth, "m")
+        not_negative("feed speed", self.feed_speed, "m/s")
+        not_negative("effective radius", self.effective_radius, "m")
         require(self.cross_feed_span[0] <= self.cross_feed_span[1], "cross feed span", self.cross_feed_span, "m",
                 "(lower, upper) with lower <= upper")
 
@@ -245,10 +192,10 @@ class SchedulePoint:
     depth: float
 
     def __post_init__(self) -> None:
-        _not_negative("schedule time", self.time, "s")
-        _not_negative("schedule tool speed", self.tool_speed, "rad/s")
-        _finite("schedule workpiece speed", self.workpiece_speed, "rad/s")
-        _finite("schedule depth", self.depth, "m")
+        not_negative("schedule time", self.time, "s")
+        not_negative("schedule tool speed", self.tool_speed, "rad/s")
+        finite("schedule workpiece speed", self.workpiece_speed, "rad/s")
+        finite("schedule depth", self.depth, "m")
 
 
 @dataclass(frozen=True)
@@ -281,11 +228,11 @@ class Operation:
         if self.process == "turn-milling":
             require(self.workpiece.is_bar, "workpiece", self.workpiece.name, "",
                     "a bar (diameter, length) in turn-milling")
-            _positive("axial feed", self.axial_feed, "m/rev")
+            positive("axial feed", self.axial_feed, "m/rev")
         else:
             require(self.conditions.workpiece_speed == 0, "workpiece speed", self.conditions.workpiece_speed, "rad/s",
                     "0 in milling")
-            _positive("feed per tooth", self.feed_per_tooth, "m")
+            positive("feed per tooth", self.feed_per_tooth, "m")
         require(self.conditions.depth <= self.tool.flute_length, "depth", self.conditions.depth, "m",
                 f"at most the tool's flute length {self.tool.flute_length} m")
         times = [p.time for p in self.schedule]

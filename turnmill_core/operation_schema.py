@@ -6,81 +6,44 @@ without a new schema number as long as old files keep their meaning.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    TypeAdapter,
-    model_validator,
-)
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic import Field, TypeAdapter, model_validator
+from pydantic_core import PydanticCustomError
 
-from .operation_quantity import KINDS, Bound, quantity_value
+from .operation_units import (
+    Angle,
+    EdgeForce,
+    FeedPerRevolution,
+    Frequency,
+    Length,
+    Mass,
+    Number,
+    PositiveAngle,
+    PositiveLength,
+    PositivePressure,
+    PositiveSpeed,
+    Pressure,
+    Ratio,
+    Section,
+    SignedSpeed,
+    SpindleSpeed,
+    Text,
+    Time,
+)
 
 SCHEMA_VERSION = 1
 
 
-@dataclass(frozen=True)
-class _Unit:
-    """Annotation of a quantity: a text with its unit in the file, a float in SI units in the model."""
-
-    unit: str
-    bound: Bound = "any"
-
-    def _parse(self, text: object) -> float:
-        try:
-            return quantity_value(text, KINDS[self.unit], self.bound)
-        except ValueError as error:
-            raise PydanticCustomError(
-                "quantity", "{reason}", {"reason": str(error).removeprefix("expected ")}
-            ) from None
-
-    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._parse)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        example = KINDS[self.unit].example
-        return {"type": "string", "examples": [example], "x-unit": self.unit, "x-bound": self.bound}
-
-
-_Length = Annotated[float, _Unit("m")]
-_PositiveLength = Annotated[float, _Unit("m", "positive")]
-_Angle = Annotated[float, _Unit("rad")]
-_PositiveAngle = Annotated[float, _Unit("rad", "positive")]
-_Time = Annotated[float, _Unit("s", "not negative")]
-_PositiveSpeed = Annotated[float, _Unit("rad/s", "positive")]
-_SpindleSpeed = Annotated[float, _Unit("rad/s", "not negative")]
-_SignedSpeed = Annotated[float, _Unit("rad/s")]
-_Frequency = Annotated[float, _Unit("Hz", "positive")]
-_Ratio = Annotated[float, _Unit("%", "positive")]
-_Mass = Annotated[float, _Unit("kg", "positive")]
-_PositivePressure = Annotated[float, _Unit("Pa", "positive")]
-_Pressure = Annotated[float, _Unit("Pa")]
-_EdgeForce = Annotated[float, _Unit("N/m", "not negative")]
-_FeedPerRevolution = Annotated[float, _Unit("m/rev", "positive")]
-
-_Text = Annotated[str, Field(min_length=1, max_length=200)]
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ModeSection(_Section):
+class ModeSection(Section):
     """One vibration mode at the cutting point: direction (a direct mode) or shape."""
 
     direction: Literal["x", "y", "z"] | None = Field(None, description="direct mode along this axis of the frame")
-    shape: tuple[_Number, _Number, _Number] | None = Field(
+    shape: tuple[Number, Number, Number] | None = Field(
         None, description="mode shape (x, y, z) at the cutting point, numbers without unit, for the modal mass given")
-    frequency: _Frequency = Field(description="undamped natural frequency")
-    damping: _Ratio = Field(description="viscous damping ratio, in percent, below 100 %")
-    mass: _Mass = Field(description="modal mass")
+    frequency: Frequency = Field(description="undamped natural frequency")
+    damping: Ratio = Field(description="viscous damping ratio, in percent, below 100 %")
+    mass: Mass = Field(description="modal mass")
 
     @model_validator(mode="after")
     def _one_shape(self) -> ModeSection:
@@ -93,106 +56,121 @@ class ModeSection(_Section):
         return self
 
 
-class StructureSection(_Section):
+class StructureSection(Section):
     """Vibration modes at the cutting point and the frame of their directions."""
 
     frame: Literal["machine", "tool"] = Field(description="frame of direction and shape (docs/frames.md)")
     modes: tuple[ModeSection, ...] = Field(min_length=1, description="modes; a rigid structure is left out")
 
 
-class ToolSection(_Section):
+class ToolSection(Section):
     """Cylindrical end mill or face mill."""
 
-    name: _Text = Field(description="tool, for people")
-    diameter: _PositiveLength = Field(description="diameter at the cutting edges")
+    name: Text = Field(description="tool, for people")
+    diameter: PositiveLength = Field(description="diameter at the cutting edges")
     teeth: int = Field(strict=True, ge=1, le=200, description="number of teeth")
-    helix_angle: _Angle = Field(0.0, description="helix angle, 0 deg if left out")
-    flute_length: _PositiveLength | None = Field(None, description="longest axial depth, no limit if left out")
-    pitch_angles: tuple[_PositiveAngle, ...] = Field(
+    helix_angle: Angle = Field(0.0, description="helix angle, 0 deg if left out")
+    flute_length: PositiveLength | None = Field(None, description="longest axial depth, no limit if left out")
+    pitch_angles: tuple[PositiveAngle, ...] = Field(
         (), description="from each tooth to the next, one per tooth, sum 360 deg; equal pitch if left out")
-    runout: tuple[_Length, ...] = Field((), description="radial offset of each tooth; none if left out")
+    runout: tuple[Length, ...] = Field((), description="radial offset of each tooth; none if left out")
     structure: StructureSection | None = Field(None, description="tool modes; rigid if left out")
 
 
-class BarSection(_Section):
+class BarSection(Section):
     """Round bar on the workpiece spindle."""
 
-    name: _Text = Field(description="workpiece, for people")
-    diameter: _PositiveLength = Field(description="diameter before the cut")
-    length: _PositiveLength = Field(description="length from the free end face to the chuck")
-    datum: tuple[_Length, _Length, _Length] = Field(
+    name: Text = Field(description="workpiece, for people")
+    diameter: PositiveLength = Field(description="diameter before the cut")
+    length: PositiveLength = Field(description="length from the free end face to the chuck")
+    datum: tuple[Length, Length, Length] = Field(
         (0.0, 0.0, 0.0), description="machine coordinates of the centre of the free end face")
     structure: StructureSection | None = Field(None, description="workpiece modes; rigid if left out")
 
 
-class BlockSection(_Section):
+class BlockSection(Section):
     """Rectangular block on the table."""
 
-    name: _Text = Field(description="workpiece, for people")
-    length: _PositiveLength = Field(description="size along x, the feed")
-    width: _PositiveLength = Field(description="size along y")
-    height: _PositiveLength = Field(description="size along z, the tool axis")
-    datum: tuple[_Length, _Length, _Length] = Field(
+    name: Text = Field(description="workpiece, for people")
+    length: PositiveLength = Field(description="size along x, the feed")
+    width: PositiveLength = Field(description="size along y")
+    height: PositiveLength = Field(description="size along z, the tool axis")
+    datum: tuple[Length, Length, Length] = Field(
         (0.0, 0.0, 0.0), description="machine coordinates of the corner with the lowest x and y on the top face")
     structure: StructureSection | None = Field(None, description="workpiece modes; rigid if left out")
 
 
-class MaterialSection(_Section):
-    """Cutting force coefficients."""
+class MaterialSection(Section):
+    """Cutting force coefficients, or an alloy of the database and the rake angle that they follow from."""
 
-    name: _Text = Field(description="work material, for people")
-    Ktc: _PositivePressure = Field(description="tangential, per chip area")
-    Krc: _Pressure = Field(description="radial, per chip area")
-    Kac: _Pressure = Field(description="axial, per chip area")
-    Kte: _EdgeForce = Field(0.0, description="tangential, per edge length; 0 N/mm if left out")
-    Kre: _EdgeForce = Field(0.0, description="radial, per edge length; 0 N/mm if left out")
-    Kae: _EdgeForce = Field(0.0, description="axial, per edge length; 0 N/mm if left out")
+    name: Text | None = Field(None, description="work material, for people; the alloy's name if left out")
+    Ktc: PositivePressure | None = Field(None, description="tangential, per chip area")
+    Krc: Pressure | None = Field(None, description="radial, per chip area")
+    Kac: Pressure | None = Field(None, description="axial, per chip area")
+    Kte: EdgeForce | None = Field(None, description="tangential, per edge length; 0 N/mm if left out")
+    Kre: EdgeForce | None = Field(None, description="radial, per edge length; 0 N/mm if left out")
+    Kae: EdgeForce | None = Field(None, description="axial, per edge length; 0 N/mm if left out")
+    alloy: Text | None = Field(
+        None, description="alloy of the database (turnmill operation --alloys), in place of coefficients")
+    rake_angle: Angle | None = Field(None, description="normal rake angle of the edges, with an alloy")
+    chip_thickness: PositiveLength | None = Field(
+        None, description="chip at which an alloy's data are taken; the mean chip of the nominal cut if left out")
+
+    @model_validator(mode="after")
+    def _coefficients_or_alloy(self) -> MaterialSection:
+        given = {key for key, value in self if value is not None}
+        own, alloy = {"name", "Ktc", "Krc", "Kac"}, {"alloy", "rake_angle"}
+        if not (own <= given <= own | {"Kte", "Kre", "Kae"}
+                or alloy <= given <= alloy | {"name", "chip_thickness"}):
+            raise PydanticCustomError(
+                "cross", "either name, Ktc, Krc, Kac (and Kte, Kre, Kae), or alloy and rake_angle (and chip_thickness)")
+        return self
 
 
-class TurnMillingCut(_Section):
+class TurnMillingCut(Section):
     """Nominal cut of orthogonal turn-milling."""
 
-    tool_speed: _PositiveSpeed = Field(description="tool spindle speed, clockwise seen from the spindle")
-    workpiece_speed: _SignedSpeed = Field(description="workpiece spindle speed about +z of the machine, signed, not 0")
-    depth: _PositiveLength = Field(description="depth of cut along the tool axis")
-    axial_feed: _FeedPerRevolution = Field(
+    tool_speed: PositiveSpeed = Field(description="tool spindle speed, clockwise seen from the spindle")
+    workpiece_speed: SignedSpeed = Field(description="workpiece spindle speed about +z of the machine, signed, not 0")
+    depth: PositiveLength = Field(description="depth of cut along the tool axis")
+    axial_feed: FeedPerRevolution = Field(
         description="feed along the bar per workpiece revolution = radial immersion; at most the tool radius")
     sense: Literal["up", "down"] = Field(
         description="up- or down-milling; with the sign of workpiece_speed it gives the direction of the axial feed")
 
 
-class MillingCut(_Section):
+class MillingCut(Section):
     """Nominal cut of milling; the tool feeds along +x."""
 
-    tool_speed: _PositiveSpeed = Field(description="tool spindle speed, clockwise seen from the spindle")
-    depth: _PositiveLength = Field(description="axial depth of cut")
-    feed_per_tooth: _PositiveLength = Field(description="feed per tooth")
+    tool_speed: PositiveSpeed = Field(description="tool spindle speed, clockwise seen from the spindle")
+    depth: PositiveLength = Field(description="axial depth of cut")
+    feed_per_tooth: PositiveLength = Field(description="feed per tooth")
     sense: Literal["up", "down", "slot", "centred"] = Field(description="side of the tool that cuts")
-    radial_immersion: _PositiveLength | None = Field(
+    radial_immersion: PositiveLength | None = Field(
         None, description="radial width of cut; left out in a slot (tool diameter) and centred (block width)")
 
 
-class TurnMillingPoint(_Section):
+class TurnMillingPoint(Section):
     """Set values at one time; linear in between."""
 
-    time: _Time = Field(description="time since the start")
-    tool_speed: _SpindleSpeed = Field(description="tool spindle speed")
-    workpiece_speed: _SignedSpeed = Field(description="workpiece spindle speed")
-    depth: _Length = Field(description="depth of cut; negative is clearance")
+    time: Time = Field(description="time since the start")
+    tool_speed: SpindleSpeed = Field(description="tool spindle speed")
+    workpiece_speed: SignedSpeed = Field(description="workpiece spindle speed")
+    depth: Length = Field(description="depth of cut; negative is clearance")
 
 
-class MillingPoint(_Section):
+class MillingPoint(Section):
     """Set values at one time; linear in between."""
 
-    time: _Time = Field(description="time since the start")
-    tool_speed: _SpindleSpeed = Field(description="tool spindle speed")
-    depth: _Length = Field(description="depth of cut; negative is clearance")
+    time: Time = Field(description="time since the start")
+    tool_speed: SpindleSpeed = Field(description="tool spindle speed")
+    depth: Length = Field(description="depth of cut; negative is clearance")
 
 
-class _Common(_Section):
+class _Common(Section):
     schema_version: Literal[1] = Field(alias="schema", description="version of this format")
-    name: _Text = Field(description="operation, for people")
-    machine: _Text = Field(description="machine tool, for people")
+    name: Text = Field(description="operation, for people")
+    machine: Text = Field(description="machine tool, for people")
     sources: str = Field("", max_length=20000, description="where the numbers come from, and what is assumed")
     tool: ToolSection
     material: MaterialSection
