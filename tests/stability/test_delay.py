@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from turnmill_core.stability.delay import delay_variation, first_principles_delay, mean_delay, tooth_period
+from turnmill_core.stability.delay import (
+    DELAY_CURVES,
+    delay_curve,
+    delay_variation,
+    discrete_delay,
+    first_principles_delay,
+    mean_delay,
+    tooth_period,
+)
 
 RPM = np.pi / 30
 
@@ -65,3 +73,46 @@ def test_a_surface_as_fast_as_the_edge_is_refused() -> None:
         first_principles_delay(np.pi, 100.0, 0.01, 1.0, 0.0)
     with pytest.raises(ValueError, match="tool radius"):
         delay_variation(0.0, 100.0, 1.0)
+
+
+def test_the_discrete_model_with_matching_points_is_the_mean() -> None:
+    """Erratum D1: no ripple."""
+    angle = np.linspace(0, np.pi, 50)
+    found = discrete_delay(np.pi / 2, 6000 * RPM, 600 * RPM, 6e-3, 18e-3, 1e-3, angle, literal=False)
+    np.testing.assert_allclose(found, mean_delay(np.pi / 2, 6000 * RPM, 600 * RPM), rtol=1e-12)
+
+
+def test_the_discrete_model_as_printed_gives_the_range_of_figure_4_28() -> None:
+    """7.48 to 7.51 ms at 6000 and 3000 rpm, two teeth, Table 4.3's diameters and depth."""
+    found = discrete_delay(np.pi, 6000 * RPM, 3000 * RPM, 6e-3, 18e-3, 1e-3, np.linspace(0, np.pi, 400)) * 1e3
+    assert 7.475 < found.min() < 7.5
+    assert 7.5 <= found.max() < 7.515
+
+
+def test_the_ripple_of_the_printed_model_grows_as_tool_and_bar_get_alike() -> None:
+    """Section 4.3.4.2: more severe as the diameters come close."""
+    angle = np.linspace(0, np.pi, 200)
+    ripple = [np.ptp(discrete_delay(np.pi / 2, 6000 * RPM, 1500 * RPM, 6e-3, 6e-3 * ratio, 1e-3, angle))
+              for ratio in (8.33, 4.0, 2.0)]
+    assert ripple[0] < ripple[1] < ripple[2]
+
+
+@pytest.mark.parametrize("model", DELAY_CURVES)
+def test_every_model_is_the_tooth_period_where_the_workpiece_stands(model: str) -> None:
+    """The printed discrete model keeps its ripple even then: its two points never match."""
+    found = delay_curve(model, np.pi, 350.0, 0.0, 10e-3, 23e-3, 1e-3, [0.0, 0.7, 1.4])  # type: ignore[arg-type]
+    np.testing.assert_allclose(found, np.pi / 350.0, rtol=0.02 if model == "discrete-literal" else 1e-12)
+    assert (np.ptp(found) > 0) == (model == "discrete-literal")
+
+
+def test_exact_and_first_order_lie_close_and_mean_lies_apart() -> None:
+    arguments = (np.pi, 350.0, 12.0, 10e-3, 23e-3, 1e-3, [0.0, 0.7, 1.4])
+    first, exact, mean = (delay_curve(m, *arguments) for m in ("first-principles", "exact", "mean"))  # type: ignore[arg-type]
+    assert np.abs(first - exact).max() < 0.2 * np.abs(first - mean).max()
+
+
+def test_unknown_models_and_impossible_depths_are_refused() -> None:
+    with pytest.raises(ValueError, match="delay model"):
+        delay_curve("thesis", np.pi, 350.0, 1.0, 10e-3, 23e-3, 1e-3, 0.0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="depth"):
+        discrete_delay(np.pi, 350.0, 1.0, 10e-3, 23e-3, 23e-3, 0.0)

@@ -1,24 +1,33 @@
-"""Regeneration delay of milling and turn-milling, three models by name (thesis 4.3.4, errata D1 to D3).
+"""Regeneration delay of milling and turn-milling by several models, each with its name (thesis 4.3.4, errata D1 to D3).
 
 The regeneration delay is the time since the preceding tooth cut the surface that is being cut now.
 
-- ``"milling"``: the tooth passing period; the workpiece's rotation is left out.
+- ``"milling"``: the tooth passing period Td; the workpiece's rotation is left out.
 - ``"mean"``: the mean of the thesis' discrete model, Td (1 + Omega_c / Omega_t) (Eq. 4.88, erratum
   D1); the workpiece's rotation always lengthens the delay. The default.
+- ``"discrete-literal"``: the discrete model as printed (Eq. 4.74-4.88), with a ripple over the cut that comes from two
+  points that do not match (erratum D1).
+- ``"discrete-consistent"``: the same with matching points. It has no ripple: it is the mean.
 - ``"first-principles"``: the time since the preceding tooth passed the material point that is being
   cut, Td (1 - v cos(phi) / (R_t Omega_t)) to first order with the surface speed v = R(z) Omega_c
   (erratum D3); shorter in up-milling, longer in down-milling, and it varies with the angle phi.
+- ``"exact"``: that time without the expansion, by intersecting the two teeth's paths.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Floats = NDArray[np.float64]
 DelayModel = Literal["milling", "mean", "first-principles"]
-DELAY_MODELS: tuple[DelayModel, ...] = ("milling", "mean", "first-principles")
+DELAY_MODELS: tuple[DelayModel, ...] = get_args(DelayModel)
+"""Models that the stability solvers take. The discrete one is the mean, the exact one differs in second order only."""
+DelayCurve = Literal["milling", "mean", "discrete-literal", "discrete-consistent", "first-principles", "exact"]
+DELAY_CURVES: tuple[DelayCurve, ...] = get_args(DelayCurve)
+"""All models, as curves over the angle of a tooth."""
 
 
 def _check(tool_speed: float) -> None:
@@ -26,19 +35,42 @@ def _check(tool_speed: float) -> None:
         raise ValueError(f"tool speed is {tool_speed} rad/s, expected a finite number > 0")
 
 
-def tooth_period(pitch: ArrayLike, tool_speed: float) -> NDArray[np.float64]:
+def tooth_period(pitch: ArrayLike, tool_speed: float) -> Floats:
     """Time [s] between the passes of neighbouring teeth, for pitch angles [rad] and tool speed [rad/s]."""
     _check(tool_speed)
     return np.asarray(pitch, dtype=np.float64) / tool_speed
 
 
-def mean_delay(pitch: ArrayLike, tool_speed: float, workpiece_speed: float) -> NDArray[np.float64]:
+def mean_delay(pitch: ArrayLike, tool_speed: float, workpiece_speed: float) -> Floats:
     """Mean delay [s] of each tooth, Td (1 + |Omega_c| / Omega_t) (mean of Eq. 4.88, erratum D1).
 
     pitch [rad]: angle to the preceding tooth; tool_speed, workpiece_speed [rad/s]. The limit without
     workpiece rotation is the tooth period of milling.
     """
     return tooth_period(pitch, tool_speed) * (1.0 + abs(workpiece_speed) / tool_speed)
+
+
+def discrete_delay(
+    pitch: float, tool_speed: float, workpiece_speed: float, tool_radius: float, workpiece_radius: float, depth: float,
+    angle: ArrayLike, literal: bool = True,
+) -> Floats:
+    """Delay [s] of a tooth at `angle` [rad] by the discrete motion of tool and workpiece (Eq. 4.74-4.88).
+
+    A tooth marks the bar at y = R_t sin(phi) across its axis; the mark turns with the bar for one tooth period; the
+    angle alpha about the bar's axis between the next tooth's mark and the turned one gives Td (1 + alpha / pitch).
+    literal: the mark of the present tooth is (y, R_w cos theta), the turned one R_w (sin theta', cos theta') with
+    tan(theta) = y / (R_w - a) (Eq. 4.81-4.83); since y is not R_w sin(theta), alpha ripples (erratum D1). Else both
+    marks lie on the bar, and alpha is the bar's rotation.
+    pitch [rad], speeds [rad/s], radii and depth a [m].
+    """
+    period = tooth_period(pitch, tool_speed)
+    if not 0 <= depth < workpiece_radius:
+        raise ValueError(f"depth is {depth} m, expected 0 to the bar's radius {workpiece_radius} m")
+    y = tool_radius * np.sin(np.asarray(angle, dtype=np.float64))
+    mark = np.arctan2(y, workpiece_radius - depth)
+    turned = mark - abs(workpiece_speed) * period
+    now = np.arctan2(y, workpiece_radius * np.cos(mark)) if literal else mark
+    return np.asarray(period * (1.0 + np.abs(now - turned) / pitch), dtype=np.float64)
 
 
 def delay_variation(tool_radius: float, tool_speed: float, surface_speed: float) -> float:
@@ -54,7 +86,7 @@ def delay_variation(tool_radius: float, tool_speed: float, surface_speed: float)
 
 def first_principles_delay(
     pitch: float, tool_speed: float, tool_radius: float, surface_speed: float, angle: ArrayLike, exact: bool = False,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Time [s] since the preceding tooth passed the material point now cut at `angle` [rad] (erratum D3).
 
     pitch [rad], tool_speed [rad/s], tool_radius [m], surface_speed [m/s]: speed R(z) Omega_c of the
@@ -79,3 +111,26 @@ def first_principles_delay(
             if np.all(np.abs(step) <= 1e-14 * period):
                 break
     return delay
+
+
+def delay_curve(
+    model: DelayCurve, pitch: float, tool_speed: float, workpiece_speed: float, tool_radius: float,
+    workpiece_radius: float, depth: float, angle: ArrayLike,
+) -> Floats:
+    """Delay [s] of one tooth at each `angle` (k,) [rad] by any of DELAY_CURVES.
+
+    pitch [rad], speeds [rad/s], radii and depth of cut [m]; the first-principles models take the surface speed at half
+    the depth. Raises ``ValueError`` for an unknown model and as the models do.
+    """
+    at = np.asarray(angle, dtype=np.float64)
+    if model == "milling":
+        return np.full(at.shape, float(tooth_period(pitch, tool_speed)))
+    if model == "mean":
+        return np.full(at.shape, float(mean_delay(pitch, tool_speed, workpiece_speed)))
+    if model in ("discrete-literal", "discrete-consistent"):
+        return discrete_delay(pitch, tool_speed, workpiece_speed, tool_radius, workpiece_radius, depth, at,
+                              model == "discrete-literal")
+    if model in ("first-principles", "exact"):
+        surface = abs(workpiece_speed) * (workpiece_radius - 0.5 * depth)
+        return first_principles_delay(pitch, tool_speed, tool_radius, surface, at, model == "exact")
+    raise ValueError(f"delay model is {model!r}, expected one of {', '.join(DELAY_CURVES)}")
