@@ -17,7 +17,6 @@ from pydantic import ValidationError
 
 from .operation import (
     Conditions,
-    Material,
     Mode,
     Operation,
     SchedulePoint,
@@ -26,6 +25,7 @@ from .operation import (
     Workpiece,
 )
 from .operation_errors import OperationError, first_error, shown
+from .operation_material import material_of
 from .operation_quantity import parse_quantity
 from .operation_schema import (
     ADAPTER,
@@ -164,7 +164,6 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
         pitch_angles=section.pitch_angles, runout=section.runout, structure=_structure(section.structure, "tool"),
     ))
     workpiece = built("workpiece", lambda: _workpiece(model))
-    material = built("material", lambda: Material(**model.material.model_dump()))
     cut, R = model.cut, tool.radius
     deepest, limit = (workpiece.radius, "bar's radius") if workpiece.is_bar else (workpiece.height, "block's height")
     for index, depth in enumerate([cut.depth, *(p.depth for p in model.schedule)]):
@@ -201,6 +200,7 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
         tool_speed=cut.tool_speed, workpiece_speed=workpiece_speed, depth=cut.depth, feed_speed=feed_speed,
         cross_feed_span=span, effective_radius=workpiece.radius - cut.depth if workpiece.is_bar else 0.0,
     ))
+    material = built("material", lambda: material_of(model.material, tool, conditions))
     return built("", lambda: Operation(
         name=model.name, process=model.process, machine=model.machine, tool=tool, workpiece=workpiece,
         material=material, conditions=conditions, milling_sense=cut.sense, axial_feed=axial_feed,
