@@ -167,6 +167,11 @@ class Structure:
         require(self.table is None or self.modes == self.table.modes[0], "modes", len(self.modes), "modes",
                 "those of the table's first entry")
 
+    @property
+    def flexible(self) -> bool:
+        """False for a rigid structure."""
+        return bool(self.modes) or (bool(self.cross_modes) and self.cross_reading != "none")
+
 
 def _check_turning(mode: Mode) -> None:
     u, v, w = mode.shape
