@@ -76,6 +76,7 @@ KINDS = {
         Kind("a mass", "kg", "1.303 kg"),
         Kind("a pressure", "Pa", "930 MPa"),
         Kind("a force per edge length", "N/m", "21 N/mm"),
+        Kind("an indentation coefficient", "N/m^3", "2.69e13 N/m^3"),
         Kind("a feed per revolution", "m/rev", "8 mm/rev"),
         Kind("a speed", "m/s", "650 m/min"),
         Kind("a force", "N", "120 N"),

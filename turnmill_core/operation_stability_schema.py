@@ -59,10 +59,11 @@ def process_damping_of(section: ProcessDampingSection | None) -> ProcessDamping 
     """The value of the section, None where there is none."""
     if section is None:
         return None
-    length = section.contact_length
-    if length is None:
-        assert section.hone_radius and section.separation_angle and section.clearance_angle
-        length = flank_contact_length(section.hone_radius, section.separation_angle, section.clearance_angle)
+    length, hone = section.contact_length, section.hone_radius
+    separation, clearance = section.separation_angle, section.clearance_angle
+    if hone is not None and separation is not None and clearance is not None:
+        length = flank_contact_length(hone, separation, clearance)
+    assert length is not None
     return ProcessDamping(section.indentation, length, section.friction or 0.0)
 
 
