@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from .operation_checks import finite, not_negative, positive, require
+from .operation_limits import NO_LIMITS, Limits
 from .operation_structure import RIGID, RIGID_IN_MACHINE, Frame, Mode, Structure, Vector
 
 __all__ = [
@@ -206,7 +207,8 @@ class Operation:
     workpiece revolution (turn-milling); feed_per_tooth [m] the feed of the table (milling); the
     other is 0. milling_sense: "up", "down", "slot" or "centred". schedule: what a simulated
     controller runs, at least two points, or empty (then the nominal cut is held).
-    sources: where the numbers come from. text, sha256: the file it was read from, byte for byte.
+    limits: what machine, tool and part allow. sources: where the numbers come from. text, sha256: the
+    file it was read from, byte for byte.
     """
 
     name: str
@@ -220,6 +222,7 @@ class Operation:
     axial_feed: float = 0.0
     feed_per_tooth: float = 0.0
     schedule: tuple[SchedulePoint, ...] = ()
+    limits: Limits = NO_LIMITS
     sources: str = ""
     text: str = field(default="", repr=False, compare=False)
     sha256: str = ""

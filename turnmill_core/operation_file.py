@@ -25,6 +25,7 @@ from .operation import (
     Workpiece,
 )
 from .operation_errors import OperationError, first_error, shown
+from .operation_limits_schema import limits_of
 from .operation_material import material_of
 from .operation_quantity import parse_quantity
 from .operation_schema import (
@@ -201,10 +202,12 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
         cross_feed_span=span, effective_radius=workpiece.radius - cut.depth if workpiece.is_bar else 0.0,
     ))
     material = built("material", lambda: material_of(model.material, tool, conditions))
+    limits = built("limits", lambda: limits_of(model.limits))
     return built("", lambda: Operation(
         name=model.name, process=model.process, machine=model.machine, tool=tool, workpiece=workpiece,
         material=material, conditions=conditions, milling_sense=cut.sense, axial_feed=axial_feed,
-        feed_per_tooth=feed_per_tooth, schedule=points, sources=model.sources, text=text, sha256=sha256,
+        feed_per_tooth=feed_per_tooth, schedule=points, limits=limits, sources=model.sources, text=text,
+        sha256=sha256,
     ))
 
 

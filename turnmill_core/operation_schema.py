@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, model_validator
 from pydantic_core import PydanticCustomError
 
+from .operation_limits_schema import LimitsSection
 from .operation_units import (
     Angle,
     EdgeForce,
@@ -174,6 +175,7 @@ class _Common(Section):
     sources: str = Field("", max_length=20000, description="where the numbers come from, and what is assumed")
     tool: ToolSection
     material: MaterialSection
+    limits: LimitsSection | None = Field(None, description="what machine, tool and part allow; no limits if left out")
 
 
 class TurnMillingFile(_Common):
