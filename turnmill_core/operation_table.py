@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from .operation import Operation, Structure, Vector
+from .operation_limits import NO_LIMITS, Limits
 
 Rows = list[tuple[str, str]]
 
@@ -57,6 +58,19 @@ def describe(op: Operation) -> list[tuple[str, Rows]]:
         ("material", [("name", material.name), ("Ktc Krc Kac", f"{chip} MPa"), ("Kte Kre Kae", f"{edge} N/mm")]),
         ("cut", _cut_rows(op)),
     ]
+    if op.process_damping is not None:
+        flank = op.process_damping
+        sections.append(("process damping", [
+            ("indentation coefficient", f"{flank.indentation:.4g} N/m3"),
+            ("contact length of the flank", f"{flank.contact_length * 1e6:.4g} um"),
+            ("friction", f"{flank.friction * 100:.4g} %")]))
+    if op.trials:
+        sections.append(("trials", [
+            (f"tool {_rpm(t.tool_speed)}, workpiece {_rpm(t.workpiece_speed)}, {_mm(t.depth)}",
+             t.outcome + ("" if math.isnan(t.chatter_frequency) else f" at {t.chatter_frequency:g} Hz")
+             + (f" ({t.note})" if t.note else "")) for t in op.trials]))
+    if op.limits != NO_LIMITS:
+        sections.append(("limits", _limit_rows(op.limits)))
     if op.schedule:
         points = [
             (f"{p.time:.6g} s", f"tool {_rpm(p.tool_speed)}, "
@@ -68,6 +82,29 @@ def describe(op: Operation) -> list[tuple[str, Rows]]:
         sections.append(("derived", _derived_rows(op)))
     sections.append(("file", [("sha256", op.sha256 or "none")]))
     return sections
+
+
+def _limit_rows(limits: Limits) -> Rows:
+    length, speed, cutting, force = (lambda v: f"{v * 1e3:.6g} mm"), _rpm, (lambda v: f"{v * 60:.6g} m/min"), (
+        lambda v: f"{v:.6g} N")
+    kinds = (("chip load", length), ("cutting speed", cutting), ("tool speed", speed), ("workpiece speed", speed),
+             ("depth", length), ("feed speed", cutting), ("tool force", force), ("feed force", force),
+             ("form error", lambda v: f"{v * 1e6:.6g} um"))
+    rows: Rows = []
+    for name, text in kinds:
+        low = getattr(limits, f"{name.replace(' ', '_')}_min", 0.0)
+        high = getattr(limits, f"{name.replace(' ', '_')}_max")
+        bounds = [f"at least {text(low)}"] * (low > 0) + [f"at most {text(high)}"] * math.isfinite(high)
+        if bounds:
+            rows.append((f"{name} ({limits.chip_load})" if name == "chip load" else name, ", ".join(bounds)))
+    if limits.stability_margin:
+        rows.append(("reserve to the stability limit", f"{limits.stability_margin * 100:.4g} %"))
+    for title, ratings in (("tool spindle", limits.tool_spindle), ("workpiece spindle", limits.workpiece_spindle)):
+        for r in ratings:
+            points = ", ".join(f"{p / 1e3:.4g} kW at {_rpm(s)}" for s, p in zip(r.speeds, r.powers, strict=True))
+            time = "continuous" if math.isinf(r.duration) else f"for {r.duration:.6g} s"
+            rows.append((f"{title}: {r.name}", f"{points}; {r.load}, {time}"))
+    return rows
 
 
 def _cut_rows(op: Operation) -> Rows:
