@@ -16,12 +16,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from .operation_checks import finite, not_negative, positive, require
+from .operation_cutter import CYLINDER, Shape, check_shape, require_bar_profile
 from .operation_limits import NO_LIMITS, Limits
-from .operation_structure import RIGID, RIGID_IN_MACHINE, Frame, Mode, Structure, Vector
+from .operation_stability import ProcessDamping, Trial
+from .operation_structure import RIGID, RIGID_IN_MACHINE, Beam, Frame, Mode, Structure, Vector, check_beam
 
 __all__ = [
-    "RIGID", "Conditions", "Frame", "Material", "Mode", "Operation", "Process", "SchedulePoint", "Structure", "Tool",
-    "Vector", "Workpiece", "require",
+    "CYLINDER", "RIGID", "Conditions", "Frame", "Material", "Mode", "Operation", "Process", "SchedulePoint", "Shape",
+    "Structure", "Tool", "Vector", "Workpiece", "require",
 ]
 
 Process = Literal["milling", "turn-milling"]
@@ -29,11 +31,11 @@ Process = Literal["milling", "turn-milling"]
 
 @dataclass(frozen=True)
 class Tool:
-    """Cylindrical end mill or face mill.
+    """End mill or face mill, a cylinder unless a shape is given.
 
     diameter [m]; teeth; helix_angle [rad]; flute_length [m], the longest axial depth; pitch_angles
     [rad], one per tooth, from tooth j to tooth j+1, summing to 2 pi (empty: equal pitch); runout
-    [m], radial offset of each tooth (empty: none).
+    [m], radial offset of each tooth (empty: none); shape: corner, tip, taper and details of the edges.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Tool:
     pitch_angles: tuple[float, ...] = ()
     runout: tuple[float, ...] = ()
     structure: Structure = RIGID
+    shape: Shape = CYLINDER
 
     def __post_init__(self) -> None:
         positive("tool diameter", self.diameter, "m")
@@ -61,6 +64,7 @@ class Tool:
                 len(self.runout) == self.teeth and all(math.isfinite(r) for r in self.runout),
                 "tool runout", self.runout, "m", f"{self.teeth} finite numbers",
             )
+        check_shape(self.diameter, self.teeth, self.flute_length, self.shape)
 
     @property
     def radius(self) -> float:
@@ -80,7 +84,8 @@ class Workpiece:
     Bar: diameter and length [m]; its free end face is at z = 0 of the workpiece datum and the bar
     extends towards -z. Block: length (x), width (y) and height [m]; its datum is the corner with
     the lowest x and y on its top face, z = 0 there.
-    datum [m]: machine coordinates of the workpiece datum.
+    datum [m]: machine coordinates of the workpiece datum. profile: points (z, radius) [m] of a stepped
+    or curved bar, from z = 0 to -length (empty: a cylinder). beam: how its modes follow from its shape.
     """
 
     name: str
@@ -90,9 +95,14 @@ class Workpiece:
     height: float = 0.0
     datum: Vector = (0.0, 0.0, 0.0)
     structure: Structure = RIGID_IN_MACHINE
+    profile: tuple[tuple[float, float], ...] = ()
+    beam: Beam | None = None
 
     def __post_init__(self) -> None:
         positive("workpiece length", self.length, "m")
+        if self.profile:
+            require(self.is_bar, "stock profile", len(self.profile), "points", "none: the workpiece is a block")
+            require_bar_profile(self.profile, self.length, self.radius)
         if self.is_bar:
             positive("workpiece diameter", self.diameter, "m")
             require(self.width == 0 and self.height == 0, "workpiece", (self.width, self.height), "m",
@@ -100,6 +110,10 @@ class Workpiece:
         else:
             positive("workpiece width", self.width, "m")
             positive("workpiece height", self.height, "m")
+        if self.beam is not None:
+            require(self.is_bar and not self.structure.flexible, "workpiece beam", self.name, "",
+                    "none for a block or beside a structure")
+            check_beam(self.beam, self.length, 2 * min((r for _, r in self.profile), default=self.radius))
         require(all(map(math.isfinite, self.datum)), "workpiece datum", self.datum, "m", "three finite numbers")
 
     @property
@@ -207,7 +221,8 @@ class Operation:
     workpiece revolution (turn-milling); feed_per_tooth [m] the feed of the table (milling); the
     other is 0. milling_sense: "up", "down", "slot" or "centred". schedule: what a simulated
     controller runs, at least two points, or empty (then the nominal cut is held).
-    limits: what machine, tool and part allow. sources: where the numbers come from. text, sha256: the
+    limits: what machine, tool and part allow. process_damping: of the flank.
+    trials: cuts that were made. sources: where the numbers come from. text, sha256: the
     file it was read from, byte for byte.
     """
 
@@ -222,7 +237,11 @@ class Operation:
     axial_feed: float = 0.0
     feed_per_tooth: float = 0.0
     schedule: tuple[SchedulePoint, ...] = ()
+    eccentricity: float = 0.0
+    tilt: float = 0.0
     limits: Limits = NO_LIMITS
+    process_damping: ProcessDamping | None = None
+    trials: tuple[Trial, ...] = ()
     sources: str = ""
     text: str = field(default="", repr=False, compare=False)
     sha256: str = ""
@@ -232,10 +251,14 @@ class Operation:
             require(self.workpiece.is_bar, "workpiece", self.workpiece.name, "",
                     "a bar (diameter, length) in turn-milling")
             positive("axial feed", self.axial_feed, "m/rev")
+            finite("eccentricity", self.eccentricity, "m")
+            require(abs(self.tilt) < math.pi / 2, "tilt", self.tilt, "rad", "|angle| < pi/2")
         else:
             require(self.conditions.workpiece_speed == 0, "workpiece speed", self.conditions.workpiece_speed, "rad/s",
                     "0 in milling")
             positive("feed per tooth", self.feed_per_tooth, "m")
+            require(self.eccentricity == 0 and self.tilt == 0, "eccentricity and tilt", (self.eccentricity, self.tilt),
+                    "", "0 in milling")
         require(self.conditions.depth <= self.tool.flute_length, "depth", self.conditions.depth, "m",
                 f"at most the tool's flute length {self.tool.flute_length} m")
         times = [p.time for p in self.schedule]

@@ -17,13 +17,12 @@ from pydantic import ValidationError
 
 from .operation import (
     Conditions,
-    Mode,
     Operation,
     SchedulePoint,
-    Structure,
     Tool,
     Workpiece,
 )
+from .operation_cutter_schema import profile_of, shape_of
 from .operation_errors import OperationError, first_error, shown
 from .operation_limits_schema import limits_of
 from .operation_material import material_of
@@ -33,10 +32,12 @@ from .operation_schema import (
     SCHEMA_VERSION,
     BarSection,
     MillingFile,
-    StructureSection,
     TurnMillingFile,
     operation_schema,
 )
+from .operation_stability_schema import process_damping_of, trials_of
+from .operation_structure import RIGID, RIGID_IN_MACHINE
+from .operation_structure_schema import structure_of
 from .operation_table import describe
 
 __all__ = [
@@ -162,7 +163,8 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
     tool = built("tool", lambda: Tool(
         name=section.name, diameter=section.diameter, teeth=section.teeth, helix_angle=section.helix_angle,
         flute_length=math.inf if section.flute_length is None else section.flute_length,
-        pitch_angles=section.pitch_angles, runout=section.runout, structure=_structure(section.structure, "tool"),
+        pitch_angles=section.pitch_angles, runout=section.runout, structure=structure_of(section.structure, RIGID),
+        shape=shape_of(section.shape),
     ))
     workpiece = built("workpiece", lambda: _workpiece(model))
     cut, R = model.cut, tool.radius
@@ -186,11 +188,12 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
         immersion, workpiece_speed = turn.axial_feed, turn.workpiece_speed
         feed_speed = turn.axial_feed * abs(workpiece_speed) / (2 * math.pi)
         axial_feed, feed_per_tooth = turn.axial_feed, 0.0
+        eccentricity, tilt = turn.eccentricity, turn.tilt
         points = tuple(SchedulePoint(p.time, p.tool_speed, p.workpiece_speed, p.depth) for p in model.schedule)
     else:
         mill = model.cut
         immersion = _milling_immersion(model, tool, workpiece, check, mm)
-        workpiece_speed, axial_feed, feed_per_tooth = 0.0, 0.0, mill.feed_per_tooth
+        workpiece_speed, axial_feed, feed_per_tooth, eccentricity, tilt = 0.0, 0.0, mill.feed_per_tooth, 0.0, 0.0
         feed_speed = feed_per_tooth * tool.teeth * mill.tool_speed / (2 * math.pi)
         points = tuple(SchedulePoint(p.time, p.tool_speed, 0.0, p.depth) for p in model.schedule)
     span = {
@@ -203,10 +206,13 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
     ))
     material = built("material", lambda: material_of(model.material, tool, conditions))
     limits = built("limits", lambda: limits_of(model.limits))
+    damping = built("process_damping", lambda: process_damping_of(model.process_damping))
+    trials = built("trials", lambda: trials_of(model.trials, workpiece_speed))
     return built("", lambda: Operation(
         name=model.name, process=model.process, machine=model.machine, tool=tool, workpiece=workpiece,
         material=material, conditions=conditions, milling_sense=cut.sense, axial_feed=axial_feed,
-        feed_per_tooth=feed_per_tooth, schedule=points, limits=limits, sources=model.sources, text=text,
+        feed_per_tooth=feed_per_tooth, eccentricity=eccentricity, tilt=tilt, schedule=points, limits=limits, process_damping=damping,
+        trials=trials, sources=model.sources, text=text,
         sha256=sha256,
     ))
 
@@ -231,24 +237,12 @@ def _milling_immersion(
     return given
 
 
-def _structure(section: StructureSection | None, holder: str) -> Structure:
-    if section is None:
-        return Structure(frame="tool" if holder == "tool" else "machine")
-    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    return Structure(
-        modes=tuple(
-            Mode(m.frequency, m.damping, m.mass, axes[m.direction] if m.direction else m.shape or (0.0, 0.0, 0.0))
-            for m in section.modes
-        ),
-        frame=section.frame,
-    )
-
-
 def _workpiece(model: TurnMillingFile | MillingFile) -> Workpiece:
     section = model.workpiece
-    structure = _structure(section.structure, "workpiece")
+    structure = structure_of(section.structure, RIGID_IN_MACHINE)
     if isinstance(section, BarSection):
         return Workpiece(name=section.name, diameter=section.diameter, length=section.length, datum=section.datum,
-                         structure=structure)
+                         structure=structure, profile=profile_of(section.profile),
+                         beam=None if section.beam is None else section.beam.value())
     return Workpiece(name=section.name, length=section.length, width=section.width, height=section.height,
                      datum=section.datum, structure=structure)

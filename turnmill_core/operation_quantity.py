@@ -82,6 +82,12 @@ KINDS = {
         Kind("a force", "N", "120 N"),
         Kind("a torque", "N*m", "2.5 N*m"),
         Kind("a power", "W", "3.7 kW"),
+        Kind("a stiffness", "N*m^-1", "68.6 N/um"),
+        Kind("a rotational stiffness", "N*m/rad", "6.5e5 N*m/rad"),
+        Kind("a damping", "N*s/m", "200 N*s/m"),
+        Kind("a rotational damping", "N*m*s/rad", "20 N*m*s/rad"),
+        Kind("a density", "kg/m^3", "2700 kg/m^3"),
+        Kind("a rotation per displacement", "rad/m", "30 rad/m"),
     )
 }
 """Quantities by SI unit. The unit "%" stands for a ratio and is stored as the plain ratio."""

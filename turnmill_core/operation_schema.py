@@ -11,21 +11,20 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, model_validator
 from pydantic_core import PydanticCustomError
 
+from .operation_cutter_schema import ProfilePoint, ShapeSection
 from .operation_limits_schema import LimitsSection
+from .operation_stability_schema import ProcessDampingSection, TrialSection
+from .operation_structure_schema import BeamSection, StructureSection
 from .operation_units import (
     Angle,
     EdgeForce,
     FeedPerRevolution,
-    Frequency,
     Length,
-    Mass,
-    Number,
     PositiveAngle,
     PositiveLength,
     PositivePressure,
     PositiveSpeed,
     Pressure,
-    Ratio,
     Section,
     SignedSpeed,
     SpindleSpeed,
@@ -36,36 +35,8 @@ from .operation_units import (
 SCHEMA_VERSION = 1
 
 
-class ModeSection(Section):
-    """One vibration mode at the cutting point: direction (a direct mode) or shape."""
-
-    direction: Literal["x", "y", "z"] | None = Field(None, description="direct mode along this axis of the frame")
-    shape: tuple[Number, Number, Number] | None = Field(
-        None, description="mode shape (x, y, z) at the cutting point, numbers without unit, for the modal mass given")
-    frequency: Frequency = Field(description="undamped natural frequency")
-    damping: Ratio = Field(description="viscous damping ratio, in percent, below 100 %")
-    mass: Mass = Field(description="modal mass")
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> ModeSection:
-        if (self.direction is None) == (self.shape is None):
-            raise PydanticCustomError("cross", "either direction (x, y or z) or shape (three numbers)")
-        if self.shape is not None and not any(self.shape):
-            raise PydanticCustomError("cross", "a mode shape that is not all zero")
-        if self.damping >= 1:
-            raise PydanticCustomError("cross", "a damping ratio below 100 %")
-        return self
-
-
-class StructureSection(Section):
-    """Vibration modes at the cutting point and the frame of their directions."""
-
-    frame: Literal["machine", "tool"] = Field(description="frame of direction and shape (docs/frames.md)")
-    modes: tuple[ModeSection, ...] = Field(min_length=1, description="modes; a rigid structure is left out")
-
-
 class ToolSection(Section):
-    """Cylindrical end mill or face mill."""
+    """End mill or face mill, a cylinder unless a shape is given."""
 
     name: Text = Field(description="tool, for people")
     diameter: PositiveLength = Field(description="diameter at the cutting edges")
@@ -75,6 +46,7 @@ class ToolSection(Section):
     pitch_angles: tuple[PositiveAngle, ...] = Field(
         (), description="from each tooth to the next, one per tooth, sum 360 deg; equal pitch if left out")
     runout: tuple[Length, ...] = Field((), description="radial offset of each tooth; none if left out")
+    shape: ShapeSection | None = Field(None, description="corner, tip and taper; a cylinder if left out")
     structure: StructureSection | None = Field(None, description="tool modes; rigid if left out")
 
 
@@ -86,7 +58,16 @@ class BarSection(Section):
     length: PositiveLength = Field(description="length from the free end face to the chuck")
     datum: tuple[Length, Length, Length] = Field(
         (0.0, 0.0, 0.0), description="machine coordinates of the centre of the free end face")
+    profile: tuple[ProfilePoint, ...] = Field(
+        (), description="stepped or curved stock from the free end to the chuck; a cylinder if left out")
     structure: StructureSection | None = Field(None, description="workpiece modes; rigid if left out")
+    beam: BeamSection | None = Field(None, description="workpiece modes from its shape, instead of structure")
+
+    @model_validator(mode="after")
+    def _one_structure(self) -> BarSection:
+        if self.structure is not None and self.beam is not None:
+            raise PydanticCustomError("cross", "either structure or beam")
+        return self
 
 
 class BlockSection(Section):
@@ -121,8 +102,7 @@ class MaterialSection(Section):
     def _coefficients_or_alloy(self) -> MaterialSection:
         given = {key for key, value in self if value is not None}
         own, alloy = {"name", "Ktc", "Krc", "Kac"}, {"alloy", "rake_angle"}
-        if not (own <= given <= own | {"Kte", "Kre", "Kae"}
-                or alloy <= given <= alloy | {"name", "chip_thickness"}):
+        if not (own <= given <= own | {"Kte", "Kre", "Kae"} or alloy <= given <= alloy | {"name", "chip_thickness"}):
             raise PydanticCustomError(
                 "cross", "either name, Ktc, Krc, Kac (and Kte, Kre, Kae), or alloy and rake_angle (and chip_thickness)")
         return self
@@ -138,6 +118,9 @@ class TurnMillingCut(Section):
         description="feed along the bar per workpiece revolution = radial immersion; at most the tool radius")
     sense: Literal["up", "down"] = Field(
         description="up- or down-milling; with the sign of workpiece_speed it gives the direction of the axial feed")
+    eccentricity: Length = Field(
+        0.0, description="offset of the tool axis from the workpiece axis along +y of the machine, 0 mm if left out")
+    tilt: Angle = Field(0.0, description="B angle beyond 90 degrees, 0 deg if left out")
 
 
 class MillingCut(Section):
@@ -175,6 +158,9 @@ class _Common(Section):
     sources: str = Field("", max_length=20000, description="where the numbers come from, and what is assumed")
     tool: ToolSection
     material: MaterialSection
+    process_damping: ProcessDampingSection | None = Field(
+        None, description="damping by the flank at low cutting speed; none if left out")
+    trials: tuple[TrialSection, ...] = Field((), description="cuts that were made, shown beside computed stability")
     limits: LimitsSection | None = Field(None, description="what machine, tool and part allow; no limits if left out")
 
 

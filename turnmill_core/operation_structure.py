@@ -262,44 +262,30 @@ class BeamMaterial:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A cylinder of a stepped bar: length [m], diameter [m], bore [m] (0: solid)."""
-
-    length: float
-    diameter: float
-    bore: float = 0.0
-
-    def __post_init__(self) -> None:
-        positive("step length", self.length, "m")
-        positive("step diameter", self.diameter, "m")
-        require(0 <= self.bore < self.diameter, "step bore", self.bore, "m", f"at least 0, below {self.diameter} m")
-
-
-@dataclass(frozen=True)
 class Beam:
-    """A bar whose modes are computed from its shape (thesis 4.3.2).
+    """How the modes of a bar follow from its shape (thesis 4.3.2).
 
-    steps: its stock from the free end to the chuck, as many as needed; chuck_x, chuck_y: in the planes of x_M and
-    y_M. supports: along it. shear: shear coefficient by name. modes: how many are kept in each plane.
+    material; chuck_x, chuck_y: in the planes of x_M and y_M. supports: along it. bore [m]: diameter of a hole along
+    the axis (0: solid). shear: shear coefficient by name. modes: how many are kept in each plane.
     """
 
     material: BeamMaterial
-    steps: tuple[Step, ...]
     chuck_x: Chuck
     chuck_y: Chuck
     supports: tuple[Support, ...] = ()
+    bore: float = 0.0
     shear: ShearCoefficient = "cowper"
     modes: int = 3
 
     def __post_init__(self) -> None:
-        require(bool(self.steps), "beam steps", self.steps, "", "at least one")
+        not_negative("beam bore", self.bore, "m")
         require(self.shear in ("cowper", "hutchinson"), "shear coefficient", self.shear, "", "cowper or hutchinson")
         require(1 <= self.modes <= 20, "beam modes", self.modes, "", "an integer from 1 to 20")
-        for support in self.supports:
-            require(support.position < self.length, "support position", support.position, "m",
-                    f"below the bar's length {self.length} m")
 
-    @property
-    def length(self) -> float:
-        """From the free end to the chuck [m]."""
-        return math.fsum(step.length for step in self.steps)
+
+def check_beam(beam: Beam, length: float, smallest: float) -> None:
+    """Refuse a beam that does not fit a bar of this length [m] and smallest diameter `smallest` [m]."""
+    require(beam.bore < smallest, "beam bore", beam.bore, "m", f"below the bar's smallest diameter {smallest} m")
+    for support in beam.supports:
+        require(support.position <= length, "support position", support.position, "m",
+                f"at most the bar's length {length} m")
