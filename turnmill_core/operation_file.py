@@ -211,9 +211,8 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
     return built("", lambda: Operation(
         name=model.name, process=model.process, machine=model.machine, tool=tool, workpiece=workpiece,
         material=material, conditions=conditions, milling_sense=cut.sense, axial_feed=axial_feed,
-        feed_per_tooth=feed_per_tooth, eccentricity=eccentricity, tilt=tilt, schedule=points, limits=limits, process_damping=damping,
-        trials=trials, sources=model.sources, text=text,
-        sha256=sha256,
+        feed_per_tooth=feed_per_tooth, eccentricity=eccentricity, tilt=tilt, schedule=points, limits=limits,
+        process_damping=damping, trials=trials, sources=model.sources, text=text, sha256=sha256,
     ))
 
 

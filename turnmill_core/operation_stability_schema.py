@@ -1,4 +1,4 @@
-"""Sections `process_damping` and `trials` of an operation file: keys, units and bounds, and the values made from them."""
+"""Sections `process_damping` and `trials` of an operation file: keys, units, bounds, and the values made from them."""
 
 from __future__ import annotations
 

@@ -16,10 +16,11 @@ from tests.published.row import Row
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Mode, Operation, Structure
 from turnmill_core.operation_file import read_operation, shipped_operations
+from turnmill_core.operation_stability import flank_contact_length
 from turnmill_core.stability.collocation import solve
 from turnmill_core.stability.delay import mean_delay
 from turnmill_core.stability.floquet import FloquetVerdict
-from turnmill_core.stability.low_speed import envelope_from_tests, flank_contact_length
+from turnmill_core.stability.low_speed import envelope_from_tests
 from turnmill_core.stability.margin import stability_margin, stability_point
 from turnmill_core.stability.problem import StabilityProblem, constant_engagement
 from turnmill_core.structure.modal import modal_model, state_space

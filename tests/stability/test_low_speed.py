@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.stability.cases import textbook
+from turnmill_core.operation_stability import ProcessDamping, flank_contact_length
 from turnmill_core.stability.collocation import leading_multiplier
 from turnmill_core.stability.low_speed import (
     Envelope,
     envelope_depth,
     envelope_from_tests,
-    flank_contact_length,
-    flank_damping,
 )
 
 RPM = np.pi / 30
@@ -54,7 +53,8 @@ def test_impossible_tests_are_refused(first: tuple[float, float], second: tuple[
 
 
 @pytest.mark.parametrize("call", [
-    lambda: flank_damping(1e13, 3e-4, 0.0), lambda: flank_damping(-1.0, 3e-4, 1.0),
+    lambda: ProcessDamping(1e13, 3e-4).coefficient(0.0), lambda: ProcessDamping(-1.0, 3e-4),
+    lambda: ProcessDamping(1e13, 0.0), lambda: ProcessDamping(1e13, 3e-4, -0.1),
     lambda: flank_contact_length(0.0, 1.0, 0.1), lambda: flank_contact_length(6e-5, 1.0, 0.0),
 ])
 def test_impossible_flanks_are_refused(call: object) -> None:
@@ -65,7 +65,7 @@ def test_impossible_flanks_are_refused(call: object) -> None:
 def test_damping_lifts_the_limit_more_at_lower_speed() -> None:
     """The same flank: damping 1/V against the cut, so the limit bends upward towards low speed."""
     def gain(rpm: float) -> float:
-        damping = flank_damping(2e12, 60e-6, 5e-3 * rpm * RPM)
+        damping = ProcessDamping(2e12, 60e-6).coefficient(5e-3 * rpm * RPM)
         bare, damped = (abs(leading_multiplier(textbook(0.15e-3, rpm=rpm, process_damping=d)))
                         for d in ((0.0, 0.0), (damping, 0.3)))
         return float(np.log(bare / damped) / textbook(1e-3, rpm=rpm).period)

@@ -221,8 +221,7 @@ class DepthSeries:
     """One cut at several depths, prepared for :func:`series_multipliers`.
 
     problem: one of them, which gives all that they share. heights (S, k) [m], starts, stops (S, k, arcs) [rad]:
-    engagements. proportional: they differ by a factor of the depth only and the edge is straight. stiffening
-    [1/(s2 m)]: largest stiffening of a mode by a depth.
+    engagements. proportional: they differ by a factor of the depth only and the edge is straight.
     """
 
     problem: StabilityProblem
@@ -230,26 +229,33 @@ class DepthSeries:
     starts: Floats
     stops: Floats
     proportional: bool
-    stiffening: float
+
+    def one(self, i: int) -> DepthSeries:
+        """The depth number `i` alone."""
+        return replace(self, heights=self.heights[i:i + 1], starts=self.starts[i:i + 1], stops=self.stops[i:i + 1])
 
 
 def depth_series(problem: StabilityProblem, heights: Floats, starts: Floats, stops: Floats) -> DepthSeries:
     """Prepare a series with the engagements heights (S, k), starts, stops (S, k, arcs), else as `problem`."""
     same = (problem.helix_lag == 0 and heights.shape[1] == 2 and bool(np.all(starts == starts[0, 0]))
             and bool(np.all(stops == stops[0, 0])))
-    return DepthSeries(problem, heights, starts, stops, same, _stiffening(problem))
+    return DepthSeries(problem, heights, starts, stops, same)
 
 
 def series_multipliers(
-    series: DepthSeries, tool_speed: float, delays: Sequence[float], variation: Floats, base_nodes: float = BASE_NODES,
+    series: DepthSeries, tool_speed: float, delays: Sequence[float], variation: Floats,
+    structure: LinearStructure | None = None, base_nodes: float = BASE_NODES,
 ) -> Complexes:
     """Leading multiplier (S,), Im >= 0, at every depth of a series at tool_speed [rad/s].
 
-    delays (teeth,) [s]; variation (S,): delay variation at each depth. Neighbouring depths start from each other's
-    leading solutions. base_nodes: as in period_map.
+    delays (teeth,) [s]; variation (S,): delay variation at each depth. structure: at this speed (None: the problem's).
+    Process damping follows the speed as 1/V. Neighbouring depths start from each other's leading solutions. base_nodes:
+    as in period_map.
     """
-    p, t, S = series.problem, tables(), len(series.heights)
-    m, (c, friction) = modal_blocks(p.structure), p.process_damping
+    t, S = tables(), len(series.heights)
+    p = series.problem if structure is None else series.problem.at(structure=structure)
+    m, friction = modal_blocks(p.structure), p.process_damping[1]
+    c = p.process_damping[0] * p.tool_speed / tool_speed
     angles = tool_speed * np.array(delays)
     equal = p.equal_pitch and float(np.ptp(angles)) < 1e-12 * angles[0]
     period = p.pitch[0] if equal and not p.rotating else 2 * np.pi
@@ -258,10 +264,11 @@ def series_multipliers(
     spectrum.column(
         m.lam, m.outputs(c > 0), m.B, m.basis, tool_speed, period, p.tooth_angles, angles, variation,
         angles[0] - p.pitch[0] if equal else 0.0, joined, p.rotating, c, friction, p.helix_lag, series.heights,
-        series.starts, series.stops, *p.coefficients, series.proportional, base_nodes, series.stiffening, t.nodes,
+        series.starts, series.stops, *p.coefficients, series.proportional, base_nodes, _stiffening(p), t.nodes,
         t.points, t.weights, t.ell, t.support, t.bary, TOLERANCE, multipliers, residuals)
     for i in np.flatnonzero(residuals > 10 * TOLERANCE * np.maximum(1, np.abs(multipliers))):
         one = p.at(tool_speed=tool_speed, delays=tuple(delays), delay_variation=float(variation[i]),
+                   process_damping=(c, friction),
                    engagement=Engagement(series.heights[i], series.starts[i], series.stops[i]))
         with one_thread():
             mu: Complexes = np.linalg.eigvals(period_map(one, base_nodes).matrix).astype(np.complex128)
@@ -275,4 +282,4 @@ def leading_multiplier(problem: StabilityProblem, base_nodes: float = BASE_NODES
     e = problem.engagement
     series = depth_series(problem, *(np.array(v)[None] for v in (e.height, e.start, e.exit)))
     variation = np.array([problem.delay_variation])
-    return complex(series_multipliers(series, problem.tool_speed, problem.delays, variation, base_nodes)[0])
+    return complex(series_multipliers(series, problem.tool_speed, problem.delays, variation, base_nodes=base_nodes)[0])

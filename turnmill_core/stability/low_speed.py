@@ -1,4 +1,4 @@
-"""Low speed: process damping of the flank, and the envelope from two chatter tests (thesis 4.3.3.3, 4.3.5)."""
+"""Low speed: the envelope from two chatter tests, and the average model behind it (thesis 4.3.5)."""
 
 from __future__ import annotations
 
@@ -8,28 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from turnmill_core.operation import require
-
-
-def flank_contact_length(hone_radius: float, separation_angle: float, clearance_angle: float) -> float:
-    """Length L_w [m] of the flank that presses on the surface (Eq. 4.72).
-
-    hone_radius [m], separation_angle, clearance_angle [rad]. 60 um, 50 and 5 degrees give 294 um (erratum D6).
-    """
-    require(hone_radius > 0, "hone radius", hone_radius, "m", "a number > 0")
-    require(0 < clearance_angle < np.pi / 2, "clearance angle", clearance_angle, "rad", "an angle in (0, pi/2)")
-    b, g = separation_angle, clearance_angle
-    return float(hone_radius * (np.sin(b) + np.sin(g) + (np.cos(g) - np.cos(b)) / np.tan(g)))
-
-
-def flank_damping(indentation: float, contact_length: float, cutting_speed: float) -> float:
-    """Process damping coefficient per depth [N s/m2], K_sp L_w^2 / (2 V) (Eq. 4.70, 4.71).
-
-    indentation K_sp [N/m3], contact_length L_w [m], cutting_speed V [m/s]. The first value of
-    StabilityProblem.process_damping; the second is the friction coefficient.
-    """
-    require(cutting_speed > 0, "cutting speed", cutting_speed, "m/s", "a number > 0")
-    require(indentation >= 0, "indentation coefficient", indentation, "N/m3", "a number >= 0")
-    return indentation * contact_length**2 / (2 * cutting_speed)
 
 
 class Envelope(NamedTuple):

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from turnmill_core.cutting import engagement as cutting_engagement
 from turnmill_core.machine.conditions import machine_from_tool
-from turnmill_core.operation import Conditions, Operation, Structure, require
+from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.stability.collocation import DepthSeries, depth_series, modal_blocks, series_multipliers
 from turnmill_core.stability.delay import DELAY_MODELS, DelayModel, delay_variation, mean_delay, tooth_period
 from turnmill_core.stability.problem import Engagement, StabilityProblem
-from turnmill_core.structure.modal import LinearStructure, frozen_array, modal_model, state_space
+from turnmill_core.structure.at import ContactStructure, Position, structure_at
+from turnmill_core.structure.modal import frozen_array
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -27,29 +28,32 @@ BAR_SAMPLES = 400
 """Heights at which it is computed."""
 
 
-def stability_problem(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> StabilityProblem:
+def stability_problem(
+    op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", position: Position | None = None,
+) -> StabilityProblem:
     """The stability problem of `op` at `conditions`.
 
     delay_model: "mean" (Eq. 4.88), "milling" or "first-principles"; see :mod:`turnmill_core.stability.delay`.
+    position: axis positions for modes that depend on them, as in structure_at.
     Raises ``ValueError`` for zero engagement, zero tool speed, a depth beyond the flutes, a rigid
     structure, or an unknown delay model.
     """
-    return depth_family(op, conditions, conditions.depth, delay_model).problem(conditions.depth)
+    return depth_family(op, conditions, conditions.depth, delay_model, position).problem(conditions.depth)
 
 
 @dataclass(frozen=True, eq=False)
 class DepthFamily:
     """The stability problems of one cut at all depths up to a deepest one, else the same.
 
-    op, conditions: where they come from, at the deepest depth; delay_model: as in stability_problem. structure: at the
-    cutting point. below (k,): depths under the surface [m], ascending from 0; start, stop (k, arcs): engagement angles
+    op, conditions: where they come from, at the deepest depth; delay_model, position: as in stability_problem.
+    below (k,): depths under the surface [m], ascending from 0; start, stop (k, arcs): engagement angles
     there [rad]; kink [m]: depth below which the bar is wider than the cut (0: nowhere).
     """
 
     op: Operation
     conditions: Conditions
     delay_model: DelayModel
-    structure: LinearStructure
+    position: Position | None
     below: Floats
     start: Floats
     stop: Floats
@@ -71,11 +75,20 @@ class DepthFamily:
         heights, start, stop = self.arcs([depth])
         op, conditions = self.op, at_depth(self.op, self.conditions, depth, tool_speed)
         delays, variation = regeneration(op, conditions, self.delay_model)
+        structure, flank = self.structure(depth, tool_speed), op.process_damping
+        damping = (0.0, 0.0) if flank is None else (
+            flank.coefficient(op.tool.radius * conditions.tool_speed), flank.friction)
         return StabilityProblem(
-            structure=self.structure, tool_speed=conditions.tool_speed, pitch=tuple(float(p) for p in op.tool.pitch),
-            delays=delays, delay_variation=variation, helix_lag=math.tan(op.tool.helix_angle) / op.tool.radius,
+            structure=structure.linear, rotating=structure.rotating, tool_speed=conditions.tool_speed,
+            pitch=tuple(float(p) for p in op.tool.pitch), delays=delays, delay_variation=variation,
+            helix_lag=math.tan(op.tool.helix_angle) / op.tool.radius,
             coefficients=(op.material.Ktc, op.material.Krc, op.material.Kac),
-            engagement=Engagement(heights[0], start[0], stop[0]))
+            engagement=Engagement(heights[0], start[0], stop[0]), process_damping=damping)
+
+    def structure(self, depth: float | None = None, tool_speed: float | None = None) -> ContactStructure:
+        """Structure at the cutting point for a depth [m] and tool_speed [rad/s] (None: the conditions')."""
+        there = at_depth(self.op, self.conditions, depth, tool_speed)
+        return structure_at(self.op, machine_from_tool(self.op, there), there, self.position)
 
     @cached_property
     def deepest(self) -> StabilityProblem:
@@ -85,8 +98,8 @@ class DepthFamily:
     def free_decay(self, tool_speed: float | None = None) -> float:
         """ln|mu| at depth 0, of the free structure, at tool_speed [rad/s] (None: the conditions')."""
         p = self.deepest
-        angle = p.period * p.tool_speed
-        return float(modal_blocks(self.structure).lam.real.max() * angle / (tool_speed or p.tool_speed))
+        decay = modal_blocks(self.structure(tool_speed=tool_speed).linear).lam.real.max()
+        return float(decay * p.period * p.tool_speed / (tool_speed or p.tool_speed))
 
     def series(self, depths: Sequence[float] | Floats) -> DepthSeries:
         """The depths prepared for the fast solver."""
@@ -102,15 +115,22 @@ class DepthFamily:
             delays, variation = found[0][0], np.array([v for _, v in found])
         else:
             delays = regeneration(self.op, at_depth(self.op, self.conditions, None, speed), self.delay_model)[0]
-        return series_multipliers(series, speed, delays, variation)
+        shapes = (self.op.tool.structure, self.op.workpiece.structure)
+        if not any(shape.heights for shape in shapes):
+            return series_multipliers(series, speed, delays, variation, self.structure(tool_speed=speed).linear)
+        return np.concatenate([  # the depth of cut weighs the contact points
+            series_multipliers(series.one(i), speed, delays, variation[i:i + 1],
+                               self.structure(float(series.heights[i, -1]), speed).linear)
+            for i in range(len(series.heights))])
 
 
 def depth_family(
     op: Operation, conditions: Conditions, deepest: float, delay_model: DelayModel = "mean",
+    position: Position | None = None,
 ) -> DepthFamily:
     """The problems of `op` at `conditions` for every depth up to `deepest` [m].
 
-    delay_model and errors: as stability_problem.
+    delay_model, position and errors: as stability_problem.
     At a height the arcs depend on the distance from the C axis only, so the deepest cut holds all others.
     """
     require(conditions.tool_speed > 0, "tool speed", conditions.tool_speed, "rad/s", "a number > 0")
@@ -129,7 +149,9 @@ def depth_family(
     cuts = np.any(stop > start, axis=0)
     require(bool(np.any(cuts)), "engagement", 0.0, "rad", "a tool that cuts")
     start, stop = start[:, cuts], stop[:, cuts]
-    return DepthFamily(op, cut, delay_model, contact_structure(op, cut), below, start, stop, kink)
+    family = DepthFamily(op, cut, delay_model, position, below, start, stop, kink)
+    family.structure()  # refuses a rigid one
+    return family
 
 
 def _places(depth: float, kink: float) -> Floats:
@@ -160,19 +182,6 @@ def regeneration(op: Operation, conditions: Conditions, delay_model: DelayModel)
         surface = conditions.workpiece_speed * (conditions.effective_radius + conditions.depth / 2)
         variation = delay_variation(op.tool.radius, conditions.tool_speed, surface)
     return tuple(float(t) for t in delays), variation
-
-
-def contact_structure(op: Operation, conditions: Conditions) -> LinearStructure:
-    """Modes of tool and workpiece at the cutting point, tool frame, as a first-order system."""
-    rotation = tuple(map(tuple, machine_from_tool(op, conditions).tolist()))
-    return _structure(op.tool.structure, op.workpiece.structure, rotation)
-
-
-@lru_cache(maxsize=64)
-def _structure(tool: Structure, workpiece: Structure, rotation: tuple[tuple[float, ...], ...]) -> LinearStructure:
-    require(bool(tool.modes or workpiece.modes), "structure", "rigid", "",
-            "at least one mode of tool or workpiece; a rigid structure cannot chatter")
-    return state_space(modal_model(tool, workpiece, np.array(rotation)))
 
 
 def _bar_arcs(op: Operation, deepest: Conditions, kink: float) -> tuple[Floats, Floats, Floats]:
