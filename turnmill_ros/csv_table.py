@@ -44,8 +44,8 @@ def read_table(
     quantity: str | None,
 ) -> Table:
     """Read a table of samples; sample_rate [Hz] serves where there is no time column. See importers.import_csv."""
-    header, rows = _read(file)
-    names = [_split(name)[0] for name in header]
+    header, rows = read_cells(file)
+    names = [split_header(name)[0] for name in header]
     time = _time_column(file, header, names, time_column)
     if time is None and sample_rate is None:
         raise InputError("no time column", file=file, expected="a column called time, --time-column or --sample-rate",
@@ -56,7 +56,7 @@ def read_table(
         si, scale = _si_unit(file, header[k], unit)
         channels.append((names[k], _quantity(file, names[k], si, quantity), si))
         scales.append(scale)
-    values = _numbers(file, header, rows, [*chosen, *([] if time is None else [time])])
+    values = numbers(file, header, rows, [*chosen, *([] if time is None else [time])])
     samples = (values[:, : len(chosen)] * scales).astype(np.float32)
     if time is None:
         index, rate, start_ns = np.arange(len(values)), float(sample_rate or 0.0), START_NS
@@ -72,7 +72,8 @@ def read_table(
     return Table(tuple(channels), samples, index, rate, start_ns, None if time is None else names[time], tuple(notes))
 
 
-def _read(file: Path) -> tuple[list[str], list[list[str]]]:
+def read_cells(file: Path) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a table separated by comma, semicolon (then with decimal commas) or tabulator."""
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             first = stream.readline()
@@ -104,7 +105,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _split(header: str) -> tuple[str, str | None]:
+def split_header(header: str) -> tuple[str, str | None]:
     """Name and unit of "name (unit)" or "name [unit]"."""
     match = _HEADER_UNIT.match(header)
     return (match["name"].strip(), match["unit"].strip()) if match else (header, None)
@@ -132,7 +133,7 @@ def _chosen(
     others = [k for k in range(len(header)) if k != time]
     if columns:
         return [_find(file, header, names, name.strip(), "column") for name in columns], []
-    with_unit = [k for k in others if _split(header[k])[1] is not None]
+    with_unit = [k for k in others if split_header(header[k])[1] is not None]
     chosen = with_unit or others
     left = [names[k] for k in others if k not in chosen]
     if not chosen:
@@ -142,7 +143,7 @@ def _chosen(
 
 def _si_unit(file: Path, header: str, declared: str | None) -> tuple[str, float]:
     """SI unit of a column, and the factor that brings its numbers there."""
-    written = _split(header)[1]
+    written = split_header(header)[1]
     if declared is not None or written is None:
         return declared or "1", 1.0
     text = "standard_gravity" if written == "g" else re.sub(r"(?<=[a-z])2", "**2", written.replace("²", "**2"))
@@ -167,13 +168,14 @@ def _quantity(file: Path, name: str, unit: str, declared: str | None) -> str:
 
 def _time_scale(file: Path, header: str) -> float:
     scales = {None: 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-    unit = _split(header)[1]
+    unit = split_header(header)[1]
     if unit not in scales:
         raise InputError("unknown unit of time", file=file, key=header, value=unit, expected="s, ms, us or ns")
     return scales[unit]
 
 
-def _numbers(file: Path, header: list[str], rows: list[list[str]], columns: list[int]) -> NDArray[np.float64]:
+def numbers(file: Path, header: list[str], rows: list[list[str]], columns: list[int]) -> NDArray[np.float64]:
+    """Numbers of some columns, (rows, columns); NaN where a cell is empty."""
     values = np.empty((len(rows), len(columns)))
     for i, row in enumerate(rows):
         for j, k in enumerate(columns):

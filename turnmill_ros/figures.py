@@ -30,7 +30,8 @@ FRAME_WIDTH = 780
 RATIO_FLOOR = 1e-4
 
 
-def _figure(title: str, x: str, y: str, height: int = 260, **options: object) -> figure:
+def new_figure(title: str, x: str, y: str, height: int = 260, **options: object) -> figure:
+    """An empty picture with axis labels in the style of the suite."""
     plot = figure(title=title, x_axis_label=x, y_axis_label=y, frame_width=FRAME_WIDTH, height=height,
                   tools="pan,box_zoom,xwheel_zoom,reset,save", toolbar_location="above", **options)
     plot.toolbar.logo = None
@@ -40,7 +41,8 @@ def _figure(title: str, x: str, y: str, height: int = 260, **options: object) ->
     return plot
 
 
-def _legend_right(plot: figure) -> None:
+def legend_right(plot: figure) -> None:
+    """Put the legend beside the picture; a click on an entry hides its line."""
     plot.add_layout(plot.legend[0], "right")
     plot.legend.label_text_font_size = "10pt"
     plot.legend.click_policy = "hide"
@@ -49,7 +51,7 @@ def _legend_right(plot: figure) -> None:
 def verdict_band(segments: Sequence[tuple[float, float, ChatterKind]], x_range: Range1d | None = None) -> figure:
     """Timeline of verdicts: one coloured bar per segment (start [s], end [s], state)."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure("Verdict", "time [s]", "", 190, y_range=(0, 1), **options)
+    plot = new_figure("Verdict", "time [s]", "", 190, y_range=(0, 1), **options)
     for kind in ChatterKind:
         bars = [(a, b) for a, b, state in segments if state is kind]
         if bars:
@@ -70,7 +72,7 @@ def spectrogram(
 ) -> figure:
     """Spectrogram: level_db (frequencies, times); chatter and tooth passing as (time [s], frequency [Hz])."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure(title, "time [s]", "frequency [Hz]", 340, y_range=(float(frequencies[0]), float(frequencies[-1])),
+    plot = new_figure(title, "time [s]", "frequency [Hz]", 340, y_range=(float(frequencies[0]), float(frequencies[-1])),
                    **options)
     high = float(np.max(level_db)) if level_db.size else 0.0
     mapper = LinearColorMapper(palette="Viridis256", low=high - 70, high=high)
@@ -95,7 +97,7 @@ def ratios(verdicts: Sequence[Verdict], start_ns: int, enter: float, leave: floa
            x_range: Range1d | None = None) -> figure:
     """Asynchronous and half-order ratios over time with the decision thresholds `enter` and `leave`."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure("What the verdict stands on", "time [s]", "share of energy [1]", 280, y_axis_type="log",
+    plot = new_figure("What the verdict stands on", "time [s]", "share of energy [1]", 280, y_axis_type="log",
                    y_range=(RATIO_FLOOR, 1.5), **options)
     time = [(v.window_end_ns - start_ns) * 1e-9 for v in verdicts]
     for name, values, colour, dash in (
@@ -106,7 +108,7 @@ def ratios(verdicts: Sequence[Verdict], start_ns: int, enter: float, leave: floa
     ends = time[:1] + time[-1:]
     for name, level, dash in (("chatter above", enter, "dashed"), ("ends below", leave, "dotted")):
         plot.line(ends, [level] * len(ends), color="#444444", line_dash=dash, legend_label=name)
-    _legend_right(plot)
+    legend_right(plot)
     return plot
 
 
@@ -114,7 +116,7 @@ def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], t
              tooth_passing: float = math.nan, family: Sequence[float] = (), chatter: float = math.nan) -> figure:
     """Amplitude spectrum on a logarithmic axis with tooth harmonics and the chatter family marked."""
     floor = max(float(np.max(amplitude)) * 1e-5, 1e-30) if amplitude.size else 1e-30
-    plot = _figure(title, "frequency [Hz]", f"amplitude [{unit}]", 320, y_axis_type="log")
+    plot = new_figure(title, "frequency [Hz]", f"amplitude [{unit}]", 320, y_axis_type="log")
     source = ColumnDataSource({"f": frequencies, "a": np.maximum(amplitude, floor)})
     plot.line("f", "a", source=source, color=LINE_COLOURS[0], line_width=1.2, legend_label="spectrum")
     plot.add_tools(HoverTool(tooltips=[("frequency", "@f{0.0} Hz"), ("amplitude", "@a")], mode="vline"))
@@ -135,7 +137,7 @@ def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], t
         plot.add_layout(Span(location=chatter, dimension="height", line_color=LINE_COLOURS[1], line_dash="dashed"))
         plot.add_layout(Label(x=chatter, y=float(np.max(amplitude)), text=f"{chatter:.1f} Hz", x_offset=4,
                               text_color=LINE_COLOURS[1], text_font_size="10pt", y_offset=-12))
-    _legend_right(plot)
+    legend_right(plot)
     return plot
 
 
@@ -144,14 +146,14 @@ def forces(
 ) -> tuple[figure, figure]:
     """Forces on the tool (n, 3) [N], tool frame, and tool torque (n,) [N m] over one revolution (angle [rad])."""
     degrees = np.degrees(angle)
-    plot = _figure(
+    plot = new_figure(
         "Predicted forces on the tool over one revolution (tool frame)", "tool rotation [deg]", "force [N]", 300
     )
     for k, name in enumerate(("x feed", "y cross feed", "z tool axis")):
         plot.line(degrees, force[:, k], color=LINE_COLOURS[k], line_width=2, legend_label=name,
                   line_dash=("solid", "dashed", "dotdash")[k])
-    _legend_right(plot)
-    second = _figure("Predicted torque on the tool spindle", "tool rotation [deg]", "torque [N m]", 220,
+    legend_right(plot)
+    second = new_figure("Predicted torque on the tool spindle", "tool rotation [deg]", "torque [N m]", 220,
                      x_range=plot.x_range)
     second.line(degrees, torque, color=LINE_COLOURS[0], line_width=2)
     return plot, second
@@ -161,20 +163,20 @@ def lines_over_time(title: str, unit: str, time: Sequence[float], named: dict[st
                     x_range: Range1d | None = None) -> figure:
     """Named values over time [s]."""
     options = {} if x_range is None else {"x_range": x_range}
-    plot = _figure(title, "time [s]", unit, 240, **options)
+    plot = new_figure(title, "time [s]", unit, 240, **options)
     dashes = ("solid", "dashed", "dotdash", "dotted")
     for k, (name, values) in enumerate(named.items()):
         plot.line(list(time), list(values), color=LINE_COLOURS[k % len(LINE_COLOURS)], line_width=2,
                   line_dash=dashes[k % len(dashes)], legend_label=name)
     if named:
-        _legend_right(plot)
+        legend_right(plot)
     return plot
 
 
 def lobes(tool_speeds_rpm: NDArray[np.float64], limit_mm: NDArray[np.float64], at: tuple[float, float] | None,
           title: str) -> figure:
     """Stability limit [mm] over tool speed [rpm], with the operating point `at` (rpm, mm)."""
-    plot = _figure(title, "tool speed [rpm]", "axial depth of cut [mm]", 320)
+    plot = new_figure(title, "tool speed [rpm]", "axial depth of cut [mm]", 320)
     top = float(np.max(limit_mm)) * 1.1
     plot.varea(x=tool_speeds_rpm, y1=limit_mm, y2=np.full_like(limit_mm, top), color=LINE_COLOURS[1], alpha=0.25,
                legend_label="chatter")
@@ -185,5 +187,5 @@ def lobes(tool_speeds_rpm: NDArray[np.float64], limit_mm: NDArray[np.float64], a
         plot.scatter([at[0]], [at[1]], size=13, marker="star", color=LINE_COLOURS[0], line_color="#000000",
                      legend_label="operating point")
     plot.y_range = Range1d(0, top)
-    _legend_right(plot)
+    legend_right(plot)
     return plot

@@ -46,3 +46,15 @@ def changed_text(text: str, changes: Iterable[str]) -> str:
                 raise InputError(f"--set {change!r}: the operation has no mapping {parent!r}")
         node[leaf] = yaml.safe_load(value)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+
+
+def with_material(operation: Operation, material: dict[str, str], source: str) -> Operation:
+    """The operation with another material section; `source`, a line, is added to its sources.
+
+    Raises OperationError where the section is not one.
+    """
+    document: dict[str, Any] = yaml.safe_load(operation.text)
+    document["material"] = material
+    document["sources"] = f"{document.get('sources', '').rstrip()}\n{source}\n".lstrip()
+    return parse_operation(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100),
+                           f"{operation.name} with other material")
