@@ -18,6 +18,7 @@ from turnmill_core.cutting.loads import CuttingLoads, cutting_loads
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.process.limits import CutValues, nearest_stable
+from turnmill_core.process.surface import form_error
 from turnmill_core.stability.lobes import stability_boundary
 from turnmill_core.stability.margin import stability_margin
 
@@ -70,11 +71,8 @@ def _load_values(op: Operation, loads: CuttingLoads) -> tuple[float, ...]:
             abs(loads.workpiece_torque_peak), abs(loads.workpiece_torque_mean), across, along)
 
 
-def cut_values(op: Operation, conditions: Conditions, form_error: float = math.nan) -> CutValues:
-    """Values of one cut, each from its own full model.
-
-    form_error [m]: computed elsewhere, NaN where it is not wanted. Raises ValueError as the models do.
-    """
+def cut_values(op: Operation, conditions: Conditions) -> CutValues:
+    """Values of one cut, each from its own full model. Raises ValueError as the models do."""
     values = dict(zip(LOADS, _load_values(op, cutting_loads(op, conditions)), strict=True))
     lower, upper = math.nan, math.nan
     if op.tool.structure.modes or op.workpiece.structure.modes:
@@ -87,8 +85,26 @@ def cut_values(op: Operation, conditions: Conditions, form_error: float = math.n
         cutting_speed=op.tool.radius * conditions.tool_speed, feed_speed=conditions.feed_speed,
         feed_per_tooth=float(surface_feed_per_tooth(op, conditions.tool_speed, conditions.workpiece_speed)),
         duration=op.workpiece.length / conditions.feed_speed, stable_from=lower, stable_to=upper,
-        form_error=form_error, **values,
+        form_error=math.nan if op.process == "milling" else form_error(op, conditions).total, **values,
     )
+
+
+def form_errors(op: Operation, depths: Floats, tool_speeds: Floats, workpiece_speed: float) -> Floats:
+    """Form error [m] at depths (m,) [m] and tool_speeds (n,) [rad/s], NaN in milling: array (m, n).
+
+    workpiece_speed [rad/s]. Computed on a coarser grid; between its points it is linear in the depth and in the tooth
+    period, which is exact for the cusp and closer than 1 % for the small polygon.
+    """
+    if op.process == "milling":
+        return np.full((depths.size, tool_speeds.size), math.nan)
+    axial = any(m.shape[2] != 0 for m in (*op.tool.structure.modes, *op.workpiece.structure.modes))
+    columns, rows = (np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int))
+                     for n, most in ((tool_speeds.size, 48 if axial else 16), (depths.size, 8)))
+    coarse = np.array([[form_error(op, with_cut(op, float(tool_speeds[j]), workpiece_speed, float(depths[i]))).total
+                        for j in columns] for i in rows])
+    period = -1 / tool_speeds
+    across = np.array([np.interp(period, period[columns], row) for row in coarse])
+    return np.array([np.interp(depths, depths[rows], column) for column in across.T]).T
 
 
 def searched_depth(op: Operation, deepest: float) -> float:
@@ -102,7 +118,7 @@ def searched_depth(op: Operation, deepest: float) -> float:
 class LoadTable:
     """Loads over depth and speed ratio.
 
-    depths (m,) [m]; ratios (k,) [1], workpiece over tool speed (milling: one, 0); values (7, m, k): the fields of LOADS.
+    depths (m,) [m]; ratios (k,) [1], workpiece over tool speed (milling: one, 0); values (7, m, k): fields of LOADS.
     """
 
     depths: Floats
@@ -140,7 +156,7 @@ def grid_values(
     op: Operation, table: LoadTable, tool_speeds: Floats, workpiece_speed: float, scan: int = 16,
     progress: Progress | None = None,
 ) -> CutValues:
-    """Values at every depth of the table and each of tool_speeds (n,) [rad/s]: arrays (m, n), form error left out.
+    """Values at every depth of the table and each of tool_speeds (n,) [rad/s]: arrays (m, n).
 
     workpiece_speed [rad/s], in the sense of the operation. scan: depths at which stability is sampled at each speed
     before its limits are refined. progress: called with the share that is done.
@@ -153,7 +169,7 @@ def grid_values(
         found = stability_boundary(
             op, tool_speeds, deepest, workpiece_speed, scan=scan,
             progress=None if progress is None else lambda done, total: progress(done / total))
-        for j, intervals in enumerate(found):
+        for j, (intervals, _) in enumerate(found.stable):
             lower[:, j], upper[:, j] = nearest_stable(intervals, table.depths, deepest)
     feed_speed = (surface_feed_per_tooth(op, tool_speeds, 0.0) * op.tool.teeth * tool_speeds / (2 * math.pi)
                   if op.process == "milling" else np.full(tool_speeds.shape, op.axial_feed * abs(workpiece_speed)
@@ -163,6 +179,7 @@ def grid_values(
         tool_speed=speeds, workpiece_speed=np.full(depths.shape, abs(workpiece_speed)), depth=depths,
         cutting_speed=op.tool.radius * speeds, feed_speed=feed_speed,
         feed_per_tooth=surface_feed_per_tooth(op, speeds, workpiece_speed), duration=op.workpiece.length / feed_speed,
-        stable_from=lower, stable_to=upper, form_error=np.full(depths.shape, np.nan),
+        stable_from=lower, stable_to=upper,
+        form_error=form_errors(op, table.depths, tool_speeds, workpiece_speed),
         **table.at(abs(workpiece_speed) / tool_speeds),
     )

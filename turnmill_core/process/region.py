@@ -111,16 +111,17 @@ def speed_edges(op: Operation, table: LoadTable, workpiece_speed: float) -> Floa
             path = float(surface_feed_per_tooth(op, 1.0, 1.0))
         found += [path * abs(workpiece_speed) / c for c in (limits.chip_load_min, limits.chip_load_max) if c]
     values = np.array(sorted(set(found)))
-    return values[(values > 0) & np.isfinite(values)]
+    return np.asarray(values[(values > 0) & np.isfinite(values)], dtype=np.float64)
 
 
 def region(
     op: Operation, table: LoadTable, tool_speeds: Floats, workpiece_speed: float, scan: int = 16,
     progress: Progress | None = None,
 ) -> Region:
-    """Margins of every limit of `op` over the table's depths and tool_speeds (n,) [rad/s] at one workpiece_speed [rad/s].
+    """Margins of every limit of `op` over the table's depths and tool_speeds (n,) at one workpiece_speed [rad/s].
 
-    The speeds of :func:`speed_edges` within the range are added. table, scan, progress: as in grid_values.
+    tool_speeds [rad/s]; the speeds of :func:`speed_edges` within their range are added. table, scan, progress: as in
+    grid_values.
     """
     edges = speed_edges(op, table, workpiece_speed)
     edges = edges[(edges > tool_speeds[0]) & (edges < tool_speeds[-1])]
@@ -184,6 +185,12 @@ def _conflict(found: Region, chosen: tuple[int, ...]) -> Conflict:
                 order = [first, second]
                 asks, allows = float(found.tool_speeds[high[0]]), float(found.tool_speeds[low[-1]])
     limits = [found.margins[k] for k in order]
-    at = [tuple(float(np.broadcast_to(a, together.shape)[i, j]) for a in (m.margin, m.value, m.bound)) for m in limits]
-    return Conflict(tuple(m.name for m in limits), *zip(*at, strict=True), tuple(m.unit for m in limits),
-                    float(found.tool_speeds[j]), float(found.depths[i]), asks, allows)
+
+    def here(values: float | Floats) -> float:
+        return float(np.broadcast_to(values, together.shape)[i, j])
+
+    return Conflict(
+        limits=tuple(m.name for m in limits), margins=tuple(here(m.margin) for m in limits),
+        values=tuple(here(m.value) for m in limits), bounds=tuple(here(m.bound) for m in limits),
+        units=tuple(m.unit for m in limits), tool_speed=float(found.tool_speeds[j]), depth=float(found.depths[i]),
+        asks=asks, allows=allows)
