@@ -183,7 +183,8 @@ def test_a_straight_edge_needs_one_set_of_operators(case_1: Operation) -> None:
     assert series.proportional
     apart = dataclasses.replace(series, proportional=False)
     delays = series.problem.delays
-    np.testing.assert_allclose(*(np.abs(series_multipliers(s, series.problem.tool_speed, delays, np.zeros(2), 6.0))
+    speed = series.problem.tool_speed
+    np.testing.assert_allclose(*(np.abs(series_multipliers(s, speed, delays, np.zeros(2), None, 6.0))
                                  for s in (series, apart)), rtol=1e-6)
 
 
@@ -225,8 +226,9 @@ def low_immersion(helix: float, rpm: float) -> DepthFamily:
 
 def test_flip_lens_is_an_island() -> None:
     """With helix the cut is stable again above the lens."""
-    intervals = stable_depths(low_immersion(25.0, 23294.0), scan=40)
+    intervals, types = stable_depths(low_immersion(25.0, 23294.0), scan=40)
     assert len(intervals) >= 2
+    assert types[0, 1] == types[1, 0] == PredictedType.FLIP
     inside = 0.5 * (intervals[0, 1] + intervals[1, 0])
     verdict = solve(low_immersion(25.0, 23294.0).problem(inside))
     assert (verdict.predicted_type, verdict.flips) == (PredictedType.FLIP, 1)

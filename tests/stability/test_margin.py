@@ -181,7 +181,10 @@ def test_the_boundary_is_where_the_diagram_turns(case_1: Operation) -> None:
     speeds, depths = np.array([3000.0, 3350.0, 3600.0]) * RPM, np.linspace(0.2e-3, 5e-3, 25)
     lobes = stability_lobes(case_1, speeds, depths)
     seen: list[int] = []
-    for j, intervals in enumerate(stability_boundary(case_1, speeds, 5e-3, progress=lambda done, _: seen.append(done))):
+    boundary = stability_boundary(case_1, speeds, 5e-3, progress=lambda done, _: seen.append(done))
+    for j, (intervals, types) in enumerate(boundary.stable):
+        assert set(types[:, 1].tolist()) <= {PredictedType.STABLE, PredictedType.HOPF}
+        assert boundary.depth_limit[j] == intervals[0, 1]
         inside = [np.any((intervals[:, 0] <= a) & (a <= intervals[:, 1])) for a in depths]
         far = np.abs(lobes.spectral_radius[:, j] - 1) > 1e-3
         np.testing.assert_array_equal(np.array(inside)[far], lobes.spectral_radius[far, j] < 1)

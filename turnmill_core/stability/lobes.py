@@ -13,7 +13,7 @@ from turnmill_core.operation import Operation, require
 from turnmill_core.stability.delay import DelayModel
 from turnmill_core.stability.floquet import kinds
 from turnmill_core.stability.operating_point import depth_family
-from turnmill_core.stability.search import stable_depths
+from turnmill_core.stability.search import StableDepths, stable_depths
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -34,6 +34,25 @@ class Lobes:
     spectral_radius: Floats
     predicted_type: NDArray[np.uint8]
     depth_limit: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Stability boundary at one workpiece speed.
+
+    workpiece_speed [rad/s]; tool_speeds (n,) [rad/s]; deepest [m]: searched depth; stable: for each tool speed the
+    stable depth intervals and the types of chatter at their ends, refined.
+    """
+
+    workpiece_speed: float
+    tool_speeds: Floats
+    deepest: float
+    stable: tuple[StableDepths, ...]
+
+    @property
+    def depth_limit(self) -> Floats:
+        """Lowest stability limit (n,) [m]; the searched depth where there is none."""
+        return np.array([s.intervals[0, 1] if s.intervals.size else 0.0 for s in self.stable])
 
 
 def stability_lobes(
@@ -63,8 +82,8 @@ def stability_lobes(
 def stability_boundary(
     op: Operation, tool_speeds: Sequence[float] | Floats, deepest: float, workpiece_speed: float | None = None,
     progress: Progress | None = None, delay_model: DelayModel = "mean", scan: int = 16,
-) -> list[Floats]:
-    """Stable depth intervals (n, 2) [m] up to `deepest` [m] at each of tool_speeds [rad/s], edges refined.
+) -> Boundary:
+    """Stable depth intervals up to `deepest` [m] at each of tool_speeds [rad/s], edges refined.
 
     workpiece_speed [rad/s], progress, delay_model: as in stability_lobes. scan: depths sampled at each speed before
     the edges are refined; an island thinner than deepest / scan may be missed.
@@ -78,7 +97,7 @@ def stability_boundary(
         found.append(stable_depths(family, float(s), scan=scan, series=series))
         if progress is not None:
             progress(j + 1, speed.size)
-    return found
+    return Boundary(conditions.workpiece_speed, speed, deepest, tuple(found))
 
 
 def lowest_limit(depths: Floats, excess: Floats, at_zero: Floats) -> Floats:

@@ -139,7 +139,7 @@ def stability_margin(
     if family is None:
         return Margin(**base, depth_limit=NAN, stable_depths=np.empty((0, 2)), depth_ratio=NAN,  # type: ignore[arg-type]
                       nearest_stable_speed=NAN, limit_type=PredictedType.UNKNOWN, limit_frequency=NAN)
-    intervals = stable_depths(family, searched=searched)
+    intervals = stable_depths(family, searched=searched).intervals
     limit = depth_limit(intervals, conditions.depth)
     limit_type, limit_frequency = PredictedType.UNKNOWN, NAN
     if 0 < limit < searched:

@@ -59,7 +59,7 @@ def limit_distribution(
     limits, stable = np.empty(samples), 0
     for i in range(samples):
         family = depth_family(sampled(op, spread, rng), conditions, deepest, delay_model)
-        intervals = stable_depths(family, scan=SCAN_DEPTHS, tolerance=1e-3)
+        intervals = stable_depths(family, scan=SCAN_DEPTHS, tolerance=1e-3).intervals
         limits[i] = depth_limit(intervals, conditions.depth)
         stable += bool(np.any((intervals[:, 0] <= conditions.depth) & (conditions.depth <= intervals[:, 1])))
     return LimitDistribution(np.sort(limits), stable / samples)
