@@ -1,0 +1,89 @@
+"""Form error of the turn-milled surface: polygon, cusp and vibration along the tool axis (Eq. 4.130-4.132, 5.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.cutting.chip import prepare_cut
+from turnmill_core.cutting.forces import revolve
+from turnmill_core.machine.conditions import machine_from_tool
+from turnmill_core.operation import Conditions, Operation, require
+from turnmill_core.process.surface_profile import circularity_error, static_cusp, surface_feed_per_tooth
+from turnmill_core.structure.modal import ModalModel, frf, modal_model
+
+Floats = NDArray[np.float64]
+
+ANGLES = 240
+ELEMENTS = 24
+_STILL = 1e-15
+
+
+@dataclass(frozen=True)
+class FormError:
+    """What makes up the form error of a cut [m] (Eq. 5.6).
+
+    circularity: corner of the polygon; cusp: static cusp of the bottom edges; undercut: largest vibration of the tool
+    tip away from the axis of the workpiece while it is in the cut, which leaves material standing; overcut: largest
+    towards it, which digs in. Both >= 0 and with the mean deflection.
+    """
+
+    circularity: float
+    cusp: float
+    undercut: float
+    overcut: float
+
+    @property
+    def total(self) -> float:
+        """Largest error [m]: polygon, cusp and the larger of the two vibrations."""
+        return self.circularity + self.cusp + max(self.undercut, self.overcut)
+
+
+def form_error(op: Operation, conditions: Conditions) -> FormError:
+    """Form error of a turn-milled surface, fast enough for a search: closed forms and `forced_response`.
+
+    Zero without contact. Raises ``ValueError`` for milling, where a flat floor has no such error, and for a workpiece
+    that turns half a turn or more between teeth.
+    """
+    require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
+    if not conditions.in_cut:
+        return FormError(0.0, 0.0, 0.0, 0.0)
+    shape = op.tool.shape
+    polygon = circularity_error(conditions.effective_radius, conditions.workpiece_speed, conditions.tool_speed,
+                                op.tool.teeth)
+    cusp = static_cusp(surface_feed_per_tooth(op, conditions), shape.bottom_clearance, shape.wiper_length)
+    model = modal_model(op.tool.structure, op.workpiece.structure, machine_from_tool(op, conditions))
+    undercut = overcut = 0.0
+    if model.size and np.abs(model.shapes[2]).max() > _STILL:
+        angle, moved = forced_response(op, conditions, model)
+        undercut, overcut = printed_extremes(op, conditions, angle, moved[:, 2])
+    return FormError(polygon, cusp, undercut, overcut)
+
+
+def forced_response(op: Operation, conditions: Conditions, model: ModalModel) -> tuple[Floats, Floats]:
+    """Steady vibration under the static cutting force alone: tool angle [rad] (n,) and displacement [m] (n, 3).
+
+    The force of the rigid cut over a tool revolution, harmonic by harmonic through the receptance of `model`. In
+    milling with equal pitch this is the periodic orbit of the linear cut, because the chip does not see a vibration
+    that repeats from tooth to tooth; in turn-milling the rest is of the order of Omega_c / Omega_t.
+    """
+    force = revolve(op, prepare_cut(op, conditions, ELEMENTS), ANGLES, average=True).force_tool
+    lines = np.fft.rfft(force, axis=0)
+    receptance = frf(model, np.arange(len(lines)) * conditions.tool_speed / (2 * np.pi))
+    moved = np.fft.irfft(np.einsum("kij,kj->ki", receptance, lines), ANGLES, axis=0)
+    angle = np.asarray(np.arange(ANGLES) * (2 * np.pi / ANGLES), dtype=np.float64)
+    return angle, np.asarray(moved, dtype=np.float64)
+
+
+def printed_extremes(op: Operation, conditions: Conditions, angle: Floats, axial: Floats) -> tuple[float, float]:
+    """Undercut and overcut [m], >= 0: extremes of `axial` [m] (n,) while some tooth's tip is in the cut.
+
+    axial: displacement of the tool against the workpiece along +z_T at tool angles `angle` [rad] (n,).
+    """
+    arcs = prepare_cut(op, conditions, 1).engagement
+    turned = np.mod(angle[:, None] + np.cumsum((0.0, *op.tool.pitch[:-1])) - arcs.start[0, 0], 2 * np.pi)
+    printing = np.any(turned <= arcs.exit[0, 0] - arcs.start[0, 0], axis=1)
+    chosen = axial[printing] if printing.any() else axial
+    return float(max(0.0, chosen.max())), float(max(0.0, -chosen.min()))
