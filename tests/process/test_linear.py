@@ -131,7 +131,7 @@ def test_perturbation_grows_as_the_multipliers_say(name: str) -> None:
 def growth(step_map: LinearMap, periods: int = 60) -> float:
     """ln|mu| of the map: mean growth of a perturbation over the later half of `periods`."""
     state = MapState(np.ones(step_map.P.shape[1]), np.zeros((step_map.back, 2)))
-    weight = np.concatenate([2 * np.pi * step_map.cut.model.frequency, np.ones(step_map.cut.model.size)])
+    weight = np.concatenate([2 * np.pi * step_map.cut.modes.modes.frequency, np.ones(step_map.cut.modes.modes.size)])
     scale, sizes = 0.0, []
     for _ in range(periods):
         state, states, _ = advance(step_map, state, step_map.steps, forced=False)
@@ -144,7 +144,7 @@ def growth(step_map: LinearMap, periods: int = 60) -> float:
 
 def dissipation(steady: Vibration) -> float:
     """Energy [J] that the modes dissipate over the samples of `steady`."""
-    model = steady.cut.model
+    model = steady.cut.modes.modes
     rate = (2 * model.damping * 2 * np.pi * model.frequency * steady.states[:, model.size :] ** 2).sum(axis=1)
     return float(rate.mean()) * steady.time.size * float(steady.time[1])
 

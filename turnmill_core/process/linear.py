@@ -64,7 +64,7 @@ class LinearMap:
 
 def default_steps(cut: LinearCut, per_wave: int = 40) -> int:
     """Steps in a period that resolve the fastest mode with `per_wave` points a wave and 4 degrees of the tool."""
-    fastest = float(cut.model.frequency.max())
+    fastest = float(cut.modes.modes.frequency.max())
     return max(LEAST_STEPS // 2, math.ceil(per_wave * fastest * cut.period),
                math.ceil(LEAST_STEPS * cut.period * cut.problem.tool_speed / TWO_PI))
 

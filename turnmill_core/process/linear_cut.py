@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from turnmill_core.cutting.feed import feed_velocity
 from turnmill_core.machine.conditions import machine_from_tool
-from turnmill_core.operation import Conditions, Operation
+from turnmill_core.operation import RIGID, Conditions, Operation, require
 from turnmill_core.stability.delay import DelayModel
 from turnmill_core.stability.operating_point import stability_problem
 from turnmill_core.stability.problem import TWO_PI, StabilityProblem, engaged_pieces, kink_angles
-from turnmill_core.structure.modal import ModalModel, modal_model, state_space
+from turnmill_core.structure.at import Position, plain_structures
+from turnmill_core.structure.modal import ContactModes, contact_modes
 
 Floats = NDArray[np.float64]
 Angles = NDArray[np.floating[Any]]
@@ -33,16 +34,16 @@ FEW_INTERVALS = 12
 class LinearCut:
     """A cut with its static loads, linear in the vibration.
 
-    op, conditions: where it comes from. problem: structure, delays, engagement. model: modes, of the tool first;
-    tool_modes: how many of them. feed (2, 2) [m/s]: velocity of the tool relative to the material, x and y, at the tip
-    and at the depth of cut, linear between. edge (3,) [N/m]: Kte, Kre, Kae per height. step (N,) [m]: radius of each
-    tooth minus that of the tooth before it. lever [m]: distance of the tip from the C axis, 0 in milling.
+    op, conditions: where it comes from. problem: structure, delays, engagement. modes: at every contact point, of the
+    tool first; tool_modes: how many of them. feed (2, 2) [m/s]: velocity of the tool relative to the material, x and
+    y, at the tip and at the depth of cut, linear between. edge (3,) [N/m]: Kte, Kre, Kae per height. step (N,) [m]:
+    radius of each tooth minus that of the tooth before it. lever [m]: distance of the tip from the C axis, or 0.
     """
 
     op: Operation
     conditions: Conditions
     problem: StabilityProblem
-    model: ModalModel
+    modes: ContactModes
     tool_modes: int
     feed: Floats
     edge: Floats
@@ -57,28 +58,38 @@ class LinearCut:
 
 
 def linear_cut(
-    op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", model: ModalModel | None = None,
-    process_damping: tuple[float, float] = (0.0, 0.0),
+    op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", position: Position | None = None,
 ) -> LinearCut:
     """The linear cut of `op` at `conditions`.
 
-    delay_model: see stability.delay. model: modes of the relative displacement in the tool frame in place of the
-    operation's, those of the tool first (their number is the operation's). process_damping: see StabilityProblem.
-    Raises ``ValueError`` as stability_problem does.
+    delay_model, position: as in stability_problem, and the errors too. Raises ``ValueError`` for modes that turn with a
+    spindle: they have no fixed shape.
     """
-    problem = stability_problem(op, conditions, delay_model).at(process_damping=process_damping)
-    if model is None:
-        model = modal_model(op.tool.structure, op.workpiece.structure, machine_from_tool(op, conditions))
-    else:
-        problem = problem.at(structure=state_space(model))
+    problem = stability_problem(op, conditions, delay_model, position)
+    modes, tool_modes = contact_modes_at(op, conditions, position)
     runout = np.array(op.tool.runout or (0.0,) * op.tool.teeth)
     material = op.material
     return LinearCut(
-        op, conditions, problem, model, len(op.tool.structure.modes),
+        op, conditions, problem, modes, tool_modes,
         feed_velocity(op, conditions, np.array([0.0, conditions.depth])),
         np.array([material.Kte, material.Kre, material.Kae]) / math.cos(op.tool.helix_angle),
         runout - np.roll(runout, -1), conditions.effective_radius,
     )
+
+
+def contact_modes_at(
+    op: Operation, conditions: Conditions, position: Position | None = None,
+) -> tuple[ContactModes, int]:
+    """Modes at every contact point in the tool frame, those of the tool first, and how many of them are the tool's.
+
+    position: as in stability_problem. Raises ``ValueError`` for modes that turn with a spindle.
+    """
+    rotation = machine_from_tool(op, conditions)
+    tool, workpiece = plain_structures(op, rotation, conditions, position)
+    for name, structure in (("tool", tool), ("workpiece", workpiece)):
+        require(structure.frame != "rotating", f"{name} frame", structure.frame, "",
+                "modes that do not turn with the spindle, for a solution in time")
+    return contact_modes(tool, workpiece, rotation), contact_modes(tool, RIGID, rotation).modes.size
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ def orbit_state(step_map: LinearMap) -> MapState:
 
 def _scales(step_map: LinearMap) -> Floats:
     """Units of the states that make displacement and velocity of every mode count alike."""
-    model = step_map.cut.model
+    model = step_map.cut.modes.modes
     size = np.maximum(np.linalg.norm(model.shapes, axis=0), 1e-12)
     return np.concatenate([1 / size, 2 * np.pi * model.frequency / size])
 

@@ -12,7 +12,7 @@ from turnmill_core.cutting.forces import revolve
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.process.surface_profile import circularity_error, static_cusp, surface_feed_per_tooth
-from turnmill_core.structure.modal import ModalModel, frf, modal_model
+from turnmill_core.structure.at import plain_structures, structure_at
 
 Floats = NDArray[np.float64]
 
@@ -54,24 +54,32 @@ def form_error(op: Operation, conditions: Conditions) -> FormError:
     polygon = circularity_error(conditions.effective_radius, conditions.workpiece_speed, conditions.tool_speed,
                                 op.tool.teeth)
     cusp = static_cusp(surface_feed_per_tooth(op, conditions), shape.bottom_clearance, shape.wiper_length)
-    model = modal_model(op.tool.structure, op.workpiece.structure, machine_from_tool(op, conditions))
     undercut = overcut = 0.0
-    if model.size and np.abs(model.shapes[2]).max() > _STILL:
-        angle, moved = forced_response(op, conditions, model)
+    if moves_axially(op, conditions):
+        angle, moved = forced_response(op, conditions)
         undercut, overcut = printed_extremes(op, conditions, angle, moved[:, 2])
     return FormError(polygon, cusp, undercut, overcut)
 
 
-def forced_response(op: Operation, conditions: Conditions, model: ModalModel) -> tuple[Floats, Floats]:
+def moves_axially(op: Operation, conditions: Conditions) -> bool:
+    """True where some mode moves tool or workpiece along the tool axis."""
+    rotation = machine_from_tool(op, conditions)
+    if not any(structure.flexible for structure in plain_structures(op, rotation, conditions)):
+        return False
+    return bool(np.any(np.abs(structure_at(op, rotation, conditions).linear.C[2]) > _STILL))
+
+
+def forced_response(op: Operation, conditions: Conditions) -> tuple[Floats, Floats]:
     """Steady vibration under the static cutting force alone: tool angle [rad] (n,) and displacement [m] (n, 3).
 
-    The force of the rigid cut over a tool revolution, harmonic by harmonic through the receptance of `model`. In
+    The force of the rigid cut over a tool revolution, harmonic by harmonic through the receptance. In
     milling with equal pitch this is the periodic orbit of the linear cut, because the chip does not see a vibration
     that repeats from tooth to tooth; in turn-milling the rest is of the order of Omega_c / Omega_t.
     """
     force = revolve(op, prepare_cut(op, conditions, ELEMENTS), ANGLES, average=True).force_tool
     lines = np.fft.rfft(force, axis=0)
-    receptance = frf(model, np.arange(len(lines)) * conditions.tool_speed / (2 * np.pi))
+    structure = structure_at(op, machine_from_tool(op, conditions), conditions).linear
+    receptance = structure.frf(np.arange(len(lines)) * conditions.tool_speed / (2 * np.pi))
     moved = np.fft.irfft(np.einsum("kij,kj->ki", receptance, lines), ANGLES, axis=0)
     angle = np.asarray(np.arange(ANGLES) * (2 * np.pi / ANGLES), dtype=np.float64)
     return angle, np.asarray(moved, dtype=np.float64)

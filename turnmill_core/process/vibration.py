@@ -79,11 +79,11 @@ def vibration(step_map: LinearMap, states: Floats, contact: Floats) -> Vibration
             then = np.interp(back + np.arange(count) - lag[at], place, contact[: back + count, axis])
             change[j, :, axis] = contact[back : back + count, axis] - then
     x = states[:count]
-    structure, half = cut.problem.structure, cut.model.size
-    shapes, n = cut.model.shapes, cut.tool_modes
-    (tool, workpiece), (tool_velocity, workpiece_velocity) = (
-        (q[:, :n] @ shapes[:, :n].T, -q[:, n:] @ shapes[:, n:].T) for q in (x[:, :half], x[:, half:]))
-    velocity = x @ (structure.C[:2] @ structure.A).T
+    C, CA = cut.problem.structure.C, cut.problem.structure.C @ cut.problem.structure.A
+    of_tool = np.tile(np.arange(cut.modes.modes.size) < cut.tool_modes, 2)
+    tool, workpiece, tool_velocity, workpiece_velocity = (
+        x[:, part] @ (sign * matrix[:, part]).T for matrix in (C, CA) for part, sign in ((of_tool, 1), (~of_tool, -1)))
+    velocity = (tool_velocity - workpiece_velocity)[:, :2]
     rows = loads.static[at] + np.einsum("jtra,jta->tr", loads.gain[:, at], change)
     rows += np.einsum("tra,ta->tr", loads.damping[at], velocity)
     time = np.asarray(step_map.dt * np.arange(count), dtype=np.float64)
@@ -97,6 +97,20 @@ def time_solution(step_map: LinearMap, periods: int, state: MapState | None = No
     require(periods >= 1, "periods", periods, "", "an integer >= 1")
     after, states, contact = advance(step_map, state or at_rest(step_map), periods * step_map.steps)
     return vibration(step_map, states, contact), after
+
+
+def displacement_at(solution: Vibration, height: float) -> tuple[Floats, Floats]:
+    """Displacement [m] (m, 3) of tool and workpiece at the contact point at `height` [m] above the tip.
+
+    Differs from that at the cutting point only where the modes give shapes at several heights (Eq. 4.129).
+    """
+    modes, size = solution.cut.modes, solution.cut.modes.modes.size
+    shapes = np.array([[np.interp(height, modes.heights, modes.shapes[:, axis, n]) for n in range(size)]
+                       for axis in range(3)])
+    first, second = modes.modes.weights()
+    q = solution.states[:, :size] * first + solution.states[:, size:] * second
+    n = solution.cut.tool_modes
+    return np.asarray(q[:, :n] @ shapes[:, :n].T), np.asarray(-q[:, n:] @ shapes[:, n:].T)
 
 
 def chip_at(solution: Vibration, height: float) -> tuple[Floats, Floats]:
