@@ -161,7 +161,7 @@ def replay_specs(
     if operation_text is not None:
         chosen.append(NodeSpec(KINDS["operation_server"], {"operation_text": operation_text, "use_sim_time": True}))
     if out is not None:
-        chosen.append(NodeSpec(KINDS["recorder"], {"use_sim_time": True, "bag": out}))
+        chosen.append(NodeSpec(KINDS["recorder"], {**common, "bag": out}))
     return tuple(chosen)
 
 

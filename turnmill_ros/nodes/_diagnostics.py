@@ -10,17 +10,22 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from turnmill_ros import topics
-from turnmill_ros.nodes._endpoints import publisher
+from turnmill_ros.nodes._endpoints import publisher, taken
+
+TAKEN = "taken "
+"""Prefix of the keys under which a paced node tells how many messages it has taken from a topic."""
 
 
 class Diagnostics:
     """A node's state on /diagnostics, once a second and whenever `publish` is called.
 
-    values: called for the numbers to show; warn: called for a sentence if something is not right.
+    values: called for the numbers to show; warn: called for a sentence if something is not right; paced: tell also
+    how many messages were taken from each topic, ten times a second, so that a player does not run ahead.
     """
 
     def __init__(
         self, node: Node, values: Callable[[], Mapping[str, object]], warn: Callable[[], str | None] = lambda: None,
+        *, paced: bool = False,
     ) -> None:
         self._node, self._values, self._warn = node, values, warn
         self._publisher = publisher(node, topics.DIAGNOSTICS)
@@ -29,7 +34,8 @@ class Diagnostics:
         self.refused, self._why = 0, ""
         self.done = False
         self.phase = "inactive"
-        node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._paced = paced
+        node.create_timer(0.1 if paced else 1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def refuse(self, why: str) -> None:
         """Count a message that makes no sense, and say so in the next state."""
@@ -55,7 +61,8 @@ class Diagnostics:
         warning = None if self.failure else self._why or self._warn()
         level = DiagnosticStatus.ERROR if self.failure else DiagnosticStatus.WARN if warning else DiagnosticStatus.OK
         self._why = ""
-        shown = {**self._values(), "refused_messages": self.refused, "phase": self.phase, "done": self.done,
+        counts = {TAKEN + name: count for name, count in taken(self._node).items()} if self._paced else {}
+        shown = {**self._values(), **counts, "refused_messages": self.refused, "phase": self.phase, "done": self.done,
                  "cpu_share": f"{share:.3f}"}
         status = DiagnosticStatus(
             level=level, name=self._node.get_fully_qualified_name().strip("/"), hardware_id="turnmill",

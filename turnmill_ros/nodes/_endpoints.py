@@ -53,6 +53,7 @@ def subscription(
     executor handles every message that has arrived, which costs far less than one wake for each of them.
     """
     def handle(message: Any) -> None:
+        subscribed.taken += 1
         if always or topic.latched or node.diagnostics.phase == ACTIVE:
             try:
                 callback(message)
@@ -66,7 +67,7 @@ def subscription(
     subscribed: Subscription = node.create_subscription(
         ros_types()[topic.type], name or topic.name, handle_all, qos(topic, keep_all=not topic.latched), raw=raw,
         qos_overriding_options=QoSOverridingOptions.with_default_policies())
-    subscribed.handle_one = handle
+    subscribed.handle_one, subscribed.taken = handle, 0
     return subscribed
 
 
@@ -79,6 +80,12 @@ def send(published: Publisher, message: Any) -> None:
         except RCLError as error:
             if time.monotonic() > end:
                 raise InputError(f"{published.topic_name}: a subscriber takes no more messages") from error
+
+
+def taken(node: Node) -> dict[str, int]:
+    """Number of messages that `node` has handled, by full topic name; latched topics aside."""
+    return {s.topic_name: s.taken for s in node.subscriptions
+            if hasattr(s, "handle_one") and s.qos_profile.durability != DurabilityPolicy.TRANSIENT_LOCAL}
 
 
 def take_pending(subscribed: Subscription, callback: Callable[[Any], None], most: int | None = None) -> int:

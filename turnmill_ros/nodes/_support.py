@@ -23,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from turnmill_core.operation import Operation
 from turnmill_ros.conversions import operation_from_message, time_from_message
 from turnmill_ros.errors import InputError
-from turnmill_ros.nodes._diagnostics import Diagnostics
+from turnmill_ros.nodes._diagnostics import TAKEN, Diagnostics
 from turnmill_ros.nodes._endpoints import (
     ACTIVE,
     MATCH_DEADLINE_S,
@@ -39,8 +39,8 @@ from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.parameters import declare
 
 __all__ = [
-    "ACTIVE", "PARENT_VARIABLE", "Diagnostics", "accept_operation", "declare_common", "drain", "main", "publisher",
-    "send", "stamp_ns", "start", "stop", "subscription", "transition", "wait_for_operation",
+    "ACTIVE", "PARENT_VARIABLE", "TAKEN", "Diagnostics", "accept_operation", "declare_common", "drain", "main",
+    "publisher", "send", "stamp_ns", "start", "stop", "subscription", "transition", "wait_for_operation",
     "wait_until_acknowledged", "wait_until_alone", "wait_until_matched",
 ]
 
@@ -56,7 +56,7 @@ Transition = Callable[[Any, LifecycleState], TransitionCallbackReturn]
 def declare_common(node: Node) -> tuple[list[str], bool]:
     """Declare what every lifecycle node has; returns `match` and `lossless`."""
     match = declare(node, "match", [""], "counterparts to wait for on activation, as topic=count")
-    lossless = declare(node, "lossless", False, "wait for slow subscribers instead of overwriting (replay)")
+    lossless = declare(node, "lossless", False, "lose nothing however slow a subscriber is (replay)")
     declare(node, "autostart", True, "configure and activate at start without a lifecycle manager")
     return [entry for entry in match if entry], bool(lossless)
 

@@ -72,7 +72,7 @@ class ChatterMonitor(LifecycleNode):
         self._sent, self._lag = 0, 0.0
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.CHATTER_STATE, *VERDICT_PLOTS)}
-        self.diagnostics = support.Diagnostics(self, self._values, self._warning)
+        self.diagnostics = support.Diagnostics(self, self._values, self._warning, paced=lossless)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes)
         support.subscription(self, topics.SENSOR_BLOCKS, self.on_block)

@@ -34,7 +34,7 @@ class ForcePredictor(LifecycleNode):
         self._out = {topic: support.publisher(self, topic, keep_all=lossless) for topic in (
             topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, *LOAD_PLOTS)}
         self._loads = lru_cache(maxsize=64)(cutting_loads)
-        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None, paced=lossless)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes)
 

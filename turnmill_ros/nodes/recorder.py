@@ -33,12 +33,12 @@ class Recorder(LifecycleNode):
         self._bag = declare(self, "bag", "", "MCAP file to write; it must not exist")
         self._linger = declare(self, "linger", 0.0, "s to go on recording at the end while other nodes still publish",
                                low=0.0, high=60.0)
-        self._match, _ = support.declare_common(self)
+        self._match, lossless = support.declare_common(self)
         self._counts: Counter[str] = Counter()
         self._blocks = BlockCounts()
         self._waiting: list[tuple[Topic, bytes]] = []
         self._writer: BagWriter | None = None
-        self.diagnostics = support.Diagnostics(self, self._values, self._blocks.trouble)
+        self.diagnostics = support.Diagnostics(self, self._values, self._blocks.trouble, paced=lossless)
         self.create_timer(0.5, self._flush, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @support.transition
