@@ -18,6 +18,7 @@ from turnmill_core.structure.complex_modes import checked_phases
 from turnmill_core.structure.modal import ContactModes, LinearStructure, contact_modes, frozen_array, state_space
 from turnmill_core.structure.rotating import linear_sum, turning_structure, turning_workpiece
 from turnmill_core.structure.table import structure_at_place
+from turnmill_core.structure.workpiece import workpiece_at
 
 Position = tuple[float, float, float, float, float, float]
 
@@ -43,12 +44,12 @@ def structure_at(
 
     machine_from_tool (3, 3): rotation whose columns are the tool axes in the machine frame. conditions: tool speed,
     workpiece speed and depth are used. position: axis positions x, y, z, b, c, s [m, rad] as in an axis state; None:
-    the first entry of a table, C axis at 0. Several contact points are lumped over the depth of cut. Raises
-    ``ValueError`` for a rigid structure, for complex modes that cannot be, and for a tool that turns with its modes
-    while others do not.
+    the first entry of a table, a bar at the begin of its cut, C axis at 0. Several contact points are lumped over the
+    depth of cut. Raises ``ValueError`` for a rigid structure, for complex modes that cannot be, and for a tool that
+    turns with its modes while others do not.
     """
     rotation = tuple(map(tuple, np.asarray(machine_from_tool, dtype=np.float64).tolist()))
-    tool, workpiece = plain_structures(op, conditions, position)
+    tool, workpiece = plain_structures(op, machine_from_tool, conditions, position)
     turning = "rotating" in (tool.frame, workpiece.frame)
     depth = conditions.depth if tool.heights or workpiece.heights else 0.0
     if not turning:
@@ -58,10 +59,17 @@ def structure_at(
 
 
 def plain_structures(
-    op: Operation, conditions: Conditions, position: Position | None = None,
+    op: Operation, machine_from_tool: ArrayLike, conditions: Conditions, position: Position | None = None,
 ) -> tuple[Structure, Structure]:
-    """Tool and workpiece as structures without tables, at `conditions` and `position` as in structure_at."""
-    return _at(op.tool.structure, conditions, position), _at(op.workpiece.structure, conditions, position)
+    """Tool and workpiece as structures without tables and beams, at one instant.
+
+    machine_from_tool, conditions, position: as in structure_at.
+    """
+    if op.workpiece.beam is None:
+        workpiece = _at(op.workpiece.structure, conditions, position)
+    else:
+        workpiece = workpiece_at(op, conditions, machine_from_tool, position)
+    return _at(op.tool.structure, conditions, position), workpiece
 
 
 def _at(structure: Structure, conditions: Conditions, position: Position | None) -> Structure:

@@ -1,0 +1,174 @@
+"""Receptance coupling of bars and chuck, and the chuck's receptance from a dummy workpiece (thesis 4.3.2).
+
+A receptance of one point in one plane is a 2 x 2 matrix: displacement and rotation (y, turn) for force and moment,
+[[H, L], [N, P]] (Eq. 4.54 without cross-talk between the planes). s runs from the free end to the chuck.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+
+from turnmill_core.operation import require
+from turnmill_core.operation_structure import Chuck, ChuckMode
+from turnmill_core.structure.beam import PlaneModel, free_receptances
+from turnmill_core.structure.modal import Complexes, Floats
+
+
+@dataclass(frozen=True, eq=False)
+class TwoEnds:
+    """Receptances of a structure between its ends 1 (towards the free end) and 2 (towards the chuck).
+
+    r11, r12, r21, r22 (k, 2, 2), at k frequencies.
+    """
+
+    r11: Complexes
+    r12: Complexes
+    r21: Complexes
+    r22: Complexes
+
+
+def end_receptances(bar: PlaneModel, frequency: ArrayLike) -> TwoEnds:
+    """Receptances between both ends of a free bar at `frequency` [Hz] (k,), > 0."""
+    H = free_receptances(bar, bar.reach[[0, 1, -2, -1]], frequency)
+    return TwoEnds(H[:, :2, :2], H[:, :2, 2:], H[:, 2:, :2], H[:, 2:, 2:])
+
+
+def joint_compliance(chuck: Chuck, frequency: ArrayLike) -> Complexes:
+    """Compliance (k, 2, 2) of the joint between face and bar at `frequency` [Hz]; zero where it is rigid."""
+    w = 2 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    out = np.zeros((w.size, 2, 2), dtype=np.complex128)
+    for i, (stiffness, damping) in enumerate(((chuck.stiffness, chuck.damping),
+                                             (chuck.rotational_stiffness, chuck.rotational_damping))):
+        if not math.isinf(stiffness):
+            out[:, i, i] = 1 / (stiffness + 1j * w * damping)
+    return out
+
+
+def chuck_receptance(chuck: Chuck, frequency: ArrayLike) -> Complexes:
+    """Receptance (k, 2, 2) of the chuck with its joint, as the end of the bar feels it, at `frequency` [Hz]."""
+    w = 2 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    out = joint_compliance(chuck, frequency)
+    for mode in chuck.modes:
+        wn = 2 * np.pi * mode.frequency
+        face = np.array([1.0, -1 / mode.pivot])
+        gain = 1 / (mode.mass * (wn**2 - w**2 + 2j * mode.damping * wn * w))
+        out = out + gain[:, None, None] * np.outer(face, face)
+    return out
+
+
+def couple(first: TwoEnds, second: TwoEnds, joint: Complexes | None = None) -> TwoEnds:
+    """End 2 of `first` on end 1 of `second`, rigidly or through a joint of compliance `joint` (k, 2, 2) (Eq. 4.57)."""
+    between = first.r22 + second.r11 + (0 if joint is None else joint)
+    across, back = np.linalg.solve(between, first.r21), np.linalg.solve(between, second.r12)
+    return TwoEnds(first.r11 - first.r12 @ across, first.r12 @ back, second.r21 @ across,
+                   second.r22 - second.r21 @ back)
+
+
+def on_base(bar: TwoEnds, base: Complexes, joint: Complexes | None = None) -> Complexes:
+    """Receptance (k, 2, 2) of end 1 of a bar whose end 2 is on a base (k, 2, 2), through a joint or rigidly (Eq. 4.58).
+
+    joint (k, 2, 2): its compliance.
+    """
+    between = bar.r22 + base + (0 if joint is None else joint)
+    return np.asarray(bar.r11 - bar.r12 @ np.linalg.solve(between, bar.r21))
+
+
+def base_under(bar: TwoEnds, tip: Complexes) -> Complexes:
+    """The base (k, 2, 2) on which a bar has the receptance `tip` (k, 2, 2) at its end 1: `on_base` backwards."""
+    return np.asarray(bar.r21 @ np.linalg.solve(bar.r11 - tip, bar.r12) - bar.r22)
+
+
+def on_support(H: Complexes, point: int, stiffness: Complexes | float) -> Complexes:
+    """Receptances H (k, n, n) once the degree of freedom `point` is held by a spring of `stiffness` [N/m].
+
+    stiffness may be complex, k + i w c, (k,) or one number.
+    """
+    held = H[:, point, point] + 1 / np.asarray(stiffness)
+    return np.asarray(H - H[:, :, [point]] * H[:, [point], :] / held[:, None, None])
+
+
+def _seat(bar: PlaneModel, rows: ArrayLike, frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """A bar seen from its last node: receptances A (k, r, r) between `rows` (r, n) with that node held, motion T
+    (k, r, 2) of the rows with the node's, and the bar's dynamic stiffness Z (k, 2, 2) there, at frequency [Hz] (k,).
+    """
+    w = 2 * np.pi * frequency[:, None, None]
+    dynamic = bar.K + 1j * (bar.lossy + w * bar.C) - w**2 * bar.M
+    R = np.atleast_2d(np.asarray(rows, dtype=np.float64))
+    inner, seat = R[:, :-2], R[:, -2:]
+    inside = dynamic[:, :-2, :-2]
+    across = np.linalg.solve(inside, dynamic[:, :-2, -2:])
+    A = inner @ np.linalg.solve(inside, np.broadcast_to(inner.T.astype(complex), (frequency.size, *inner.T.shape)))
+    return np.asarray(A), np.asarray(seat - inner @ across), dynamic[:, -2:, -2:] - dynamic[:, -2:, :-2] @ across
+
+
+def seated_receptances(bar: PlaneModel, rows: ArrayLike, base: Complexes, frequency: ArrayLike) -> Complexes:
+    """Receptances (k, r, r) between `rows` (r, n) of a bar, its last node on a base (k, 2, 2).
+
+    frequency [Hz] (k,). The same as Eq. 4.58 for any point, without the rigid motion of the free bar, which at low
+    frequency is so large that it hides the rest: A + T R (1 + Z R)^-1 T^T with A the held bar, R the base.
+    """
+    A, T, Z = _seat(bar, rows, np.atleast_1d(np.asarray(frequency, dtype=np.float64)))
+    return np.asarray(A + T @ base @ np.linalg.solve(np.eye(2) + Z @ base, T.swapaxes(1, 2)))
+
+
+def chuck_from_dummy(
+    bar: PlaneModel, points: tuple[float, float], frequency: ArrayLike, H11: ArrayLike, H12: ArrayLike, H22: ArrayLike,
+) -> Complexes:
+    """The whole 2 x 2 receptance of the chuck, array (k, 2, 2), from three measured FRFs of a dummy workpiece.
+
+    bar: the dummy alone, free; points [m]: distances of the measured points 1 and 2 from its free end; frequency [Hz]
+    (k,); H11, H12, H22 [m/N] (k,): displacement for force, measured on the dummy in the chuck. Exact, without finite
+    differences: `seated_receptances` backwards, G = T^-1 (H - A) T^-T, R = (1 - G Z)^-1 G. Raises ``ValueError`` where
+    the points do not tell rotation from displacement.
+    """
+    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    measured = [np.asarray(H, dtype=np.complex128) for H in (H11, H12, H22)]
+    require(bool(np.all(f > 0)), "dummy FRF frequency", float(f.min()), "Hz", "values > 0")
+    for name, H in zip(("H11", "H12", "H22"), measured, strict=True):
+        require(H.shape == f.shape and bool(np.all(np.isfinite(H))), name, H.shape, "",
+                f"{f.size} finite complex values")
+    require(abs(points[0] - points[1]) > 1e-3 * bar.nodes[-1], "measured points", points, "m",
+            "two different places on the dummy")
+    A, T, Z = _seat(bar, np.vstack([bar.row(points[0]), bar.row(points[1])]), f)
+    H = np.stack([np.stack([measured[0], measured[1]], -1), np.stack([measured[1], measured[2]], -1)], -2)
+    left = np.linalg.solve(T, H - A)
+    G = np.linalg.solve(T, left.swapaxes(1, 2))
+    return np.asarray(np.linalg.solve(np.eye(2) - G @ Z, G))
+
+
+def fit_chuck(frequency: ArrayLike, receptance: Complexes) -> Chuck:
+    """One mode of the face and a joint that come nearest to a chuck's receptance (k, 2, 2) at `frequency` [Hz] (k,).
+
+    Least squares of the relative deviation of displacement, cross and rotation receptances. Raises ``ValueError`` where
+    no mode is within the frequencies.
+    """
+    f = np.asarray(frequency, dtype=np.float64)
+    H = receptance[:, 0, 0]
+    peak = int(np.argmax(np.abs(H)))
+    require(0 < peak < f.size - 1, "chuck FRF", float(f[peak]), "Hz", "a peak within the measured frequencies")
+    wide = f[np.abs(H) > np.abs(H[peak]) / np.sqrt(2)]
+    damping = min(max((wide.max() - wide.min()) / (2 * f[peak]), 1e-4), 0.5)
+    w = 2 * np.pi * f[peak]
+    turn = float(np.real(receptance[peak, 1, 0] / H[peak]))
+    stiff = 1 / max(float(np.median(np.abs(receptance[:, 1, 1]))), 1e-12)
+    size = np.median(np.abs(receptance), axis=0)
+
+    def chuck_of(x: Floats) -> Chuck:
+        pivot = -1 / x[3] if x[3] < -1e-9 else math.inf
+        return Chuck((ChuckMode(math.exp(x[0]), min(math.exp(x[1]), 0.99), math.exp(x[2]), pivot),),
+                     math.exp(x[4]), math.exp(x[5]), math.exp(x[4]) * abs(x[6]), math.exp(x[5]) * abs(x[7]))
+
+    def deviation(x: Floats) -> Floats:
+        off = (chuck_receptance(chuck_of(x), f) - receptance) / (np.abs(receptance) + 0.05 * size)
+        flat = off[:, [0, 0, 1], [0, 1, 1]].ravel()
+        return np.concatenate([flat.real, flat.imag])
+
+    start = [math.log(f[peak]), math.log(damping), -math.log(abs(H[peak]) * 2 * damping * w**2), min(turn, -1e-3),
+             math.log(1e3 / abs(H[0])), math.log(stiff), 1e-6, 1e-6]
+    found = least_squares(deviation, start, x_scale=[0.01, 0.1, 0.1, 1.0, 1.0, 0.3, 1e-5, 1e-5], loss="soft_l1")
+    return chuck_of(found.x)
