@@ -58,7 +58,7 @@ def test_live(launched: Any, tmp_path: Path) -> None:
     assert nodes.keys() == KINDS.keys() - {"player"}
     assert nodes["operation_server"].parameters[0]["operation_text"] == operation().text
     assert nodes["process_simulator"].parameters[0]["channels"] == ["sound", "tool_x"]
-    assert "sensor_blocks=2" in nodes["process_simulator"].parameters[0]["match"]
+    assert "sensor_blocks=3" in nodes["process_simulator"].parameters[0]["match"]
     assert nodes["recorder"].parameters[0]["linger"] == 3.0
 
 

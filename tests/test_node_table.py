@@ -21,13 +21,14 @@ def test_every_output_has_one_writer_and_every_input_a_reader() -> None:
     live = [KINDS[spec.name] for spec in live_specs("text", "bag.mcap")]
     for topic in topics.TOPICS:
         if topic not in (topics.DIAGNOSTICS, topics.CLOCK):
-            assert sum(topic in kind.outputs for kind in live) == 1, topic.name
+            expected = topic is not topics.WRENCH_MEASURED  # a dynamometer, which the simulated machine does not have
+            assert sum(topic in kind.outputs for kind in live) == expected, topic.name
             assert any(topic in kind.inputs for kind in live), topic.name
 
 
 def test_counterparts_of_a_live_run() -> None:
     found = matches(live_specs("text", "bag.mcap"))
-    assert "sensor_blocks=2" in found["process_simulator"]
+    assert "sensor_blocks=3" in found["process_simulator"]
     assert {"joint_states=5", "operation=1"} <= found["controller"]
     assert {"chatter_state=2", "stability_margin=1", "sensor_blocks=1"} <= found["chatter_monitor"]
     assert found["operation_server"] == set()
@@ -35,7 +36,7 @@ def test_counterparts_of_a_live_run() -> None:
 
 def test_counterparts_of_a_replay() -> None:
     found = matches(replay_specs("in.mcap", None, rate=0.0, operation_text=None, prior="recorded", axes="recorded"))
-    assert {"operation=3", "joint_states=3", "sensor_blocks=1", "recorded/chatter_state=1"} == found["player"]
+    assert {"operation=3", "joint_states=3", "sensor_blocks=2", "wrench/measured=1", "recorded/chatter_state=1"} == found["player"]
     monitors = found["chatter_monitor"] | found["stability_monitor"]
     assert not any(entry.startswith("stability_margin") for entry in monitors)
     given = matches(replay_specs("in.mcap", None, rate=1.0, operation_text="text", prior="none", axes="none"))

@@ -31,7 +31,8 @@ def test_history_covers_a_stall_of_one_second(topic):
 
 
 def test_inputs_are_what_a_machine_gives():
-    assert {topic.name for topic in topics.INPUTS} == {"joint_states", "sensor_blocks", "operation"}
+    assert {topic.name for topic in topics.INPUTS} == {
+        "joint_states", "sensor_blocks", "operation", "wrench/measured"}
     assert not set(topics.INPUTS) & set(topics.OUTPUTS)
 
 

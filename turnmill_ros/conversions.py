@@ -228,6 +228,16 @@ def wrench_to_message(force: ArrayLike, torque: ArrayLike, stamp_ns: int, frame_
                  wrench=wrench)
 
 
+def scale_to_message(estimate: Any, source: Any, operation_hash: str, types: Types) -> Any:
+    """turnmill_msgs/ForceScale of an estimate (turnmill_core.cutting.scale) from a source (turnmill_ros.measured)."""
+    return _make(
+        types, "turnmill_msgs/msg/ForceScale", header=header_to_message(estimate.end_ns, types, source.frame),
+        source=source.name, quantity=source.quantity, **{name: _doubles(getattr(estimate, name)) for name in (
+            "measured", "predicted", "offset")},
+        **{name: float(getattr(estimate, name)) for name in ("scale", "lower", "upper", "windows")},
+        reason=estimate.reason, operation_hash=operation_hash)
+
+
 _MARGIN_SCALARS = (
     "tool_speed", "workpiece_speed", "depth", "depth_limit", "depth_searched", "depth_ratio", "spectral_radius",
     "chatter_frequency", "principal_period", "delay", "nearest_stable_speed")

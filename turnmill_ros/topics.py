@@ -61,6 +61,12 @@ WRENCH_TOOL = Topic(
 WRENCH_MACHINE = Topic(
     "wrench/machine", "geometry_msgs/msg/WrenchStamped", "output", 100, 50.0,
     "predicted mean force and torque on the tool, machine frame, in N and N m")
+WRENCH_MEASURED = Topic(
+    "wrench/measured", "geometry_msgs/msg/WrenchStamped", "input", 2000, 1000.0,
+    "measured force on the tool, in N; frame_id tool or machine")
+FORCE_SCALE = Topic(
+    "force_scale", "turnmill_msgs/msg/ForceScale", "output", 100, 5.0,
+    "scale of the force coefficients from measured force, torque or spindle power")
 CHATTER_STATE = Topic(
     "chatter_state", "turnmill_msgs/msg/ChatterState", "output", 100, 20.0,
     "verdict on one window of the sensor signal")
@@ -96,8 +102,8 @@ PLOTS = (
 )
 
 TOPICS = (
-    JOINT_STATES, SENSOR_BLOCKS, OPERATION, CUTTING_LOADS, WRENCH_TOOL, WRENCH_MACHINE, CHATTER_STATE,
-    STABILITY_MARGIN, STABILITY_LOBES, *PLOTS, DIAGNOSTICS, CLOCK,
+    JOINT_STATES, SENSOR_BLOCKS, OPERATION, CUTTING_LOADS, WRENCH_TOOL, WRENCH_MACHINE, WRENCH_MEASURED,
+    FORCE_SCALE, CHATTER_STATE, STABILITY_MARGIN, STABILITY_LOBES, *PLOTS, DIAGNOSTICS, CLOCK,
 )
 INPUTS = tuple(topic for topic in TOPICS if topic.direction == "input")
 OUTPUTS = tuple(topic for topic in TOPICS if topic.direction == "output")

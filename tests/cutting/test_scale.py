@@ -34,7 +34,7 @@ def run(
             state, _ = update(config, state, Measured((np.round(time * SECOND)).astype(np.int64)[kept], samples[kept]))
         state, estimate = update(config, state, Predicted(
             round(k / 50 * SECOND), SPEED, load(k / 50) * cut(k / 50), cut(k / 50)))
-        found += [estimate] if estimate else []
+        found += estimate
     return found
 
 
@@ -66,7 +66,7 @@ def test_interval_covers_the_scale_in_95_percent_of_trials() -> None:
                 level = 0.9 * load(k / 5) + (7.0 if config.offset else 0.0) + rng.normal(0, 10.0, len(load(0.0)))
                 state, _ = update(config_now, state, Measured(stamps, np.array([level, level])))
                 state, estimate = update(config_now, state, Predicted(k * SECOND // 5, SPEED, load(k / 5), True))
-                last = estimate or last
+                last = estimate[-1] if estimate else last
             assert last is not None
             inside += last.lower <= 0.9 <= last.upper
         assert inside / 400 == pytest.approx(0.95, abs=0.03)
@@ -80,7 +80,7 @@ def test_follows_a_scale_that_changes_within_its_memory() -> None:
         time = k * SECOND // 50 + np.arange(20) * SECOND // 1000
         state, _ = update(config, state, Measured(time, np.full((20, 1), truth * 100)))
         state, estimate = update(config, state, Predicted(k * SECOND // 50, SPEED, np.array([100.0]), True))
-        last = estimate.scale if estimate else last
+        last = estimate[-1].scale if estimate else last
     assert last == pytest.approx(1.5, abs=1e-3)
 
 
@@ -112,9 +112,25 @@ def test_refuses_without_samples_with_gaps_and_below_one_revolution() -> None:
     sparse = run(ALL, steady, 1.0, drop=lambda t: round(t * 1000) % 10 != 0)
     assert {e.reason for e in sparse} == {"too few measured samples"}
     state, _ = update(ALL, initial(1), Predicted(0, 1.0, np.ones(1), True))
-    _, found = update(ALL, state, Predicted(SECOND, 1.0, np.ones(1), True))
-    assert found is not None
-    assert found.reason == "less than one tool revolution in a window"
+    _, found = update(ALL, state, Predicted(3 * SECOND, 1.0, np.ones(1), True))
+    assert [e.reason for e in found] == ["less than one tool revolution in a window"]
+
+
+def test_which_kind_comes_first_does_not_matter() -> None:
+    """All predictions first (within the patience), or all samples first: the same estimates."""
+    stamps = np.arange(1500, dtype=np.int64) * 1_000_000
+    samples = [Measured(stamps[k:k + 20], np.full((20, 1), 110.0)) for k in range(0, 1500, 20)]
+    loads = [Predicted(k * 20_000_000, SPEED, np.array([100.0]), True) for k in range(76)]
+    found = []
+    for items in ((*samples, *loads), (*loads, *samples)):
+        state, estimates = initial(1), []
+        for item in items:
+            state, new = update(ALL, state, item)
+            estimates += [(e.end_ns, e.scale, e.reason) for e in new]
+        found.append(estimates)
+    assert len(found[0]) == 7
+    assert found[0] == found[1]
+    assert found[0][-1][1] == pytest.approx(1.1)
 
 
 def test_the_same_whatever_the_runs_are_cut_into() -> None:
@@ -131,10 +147,10 @@ def test_the_same_whatever_the_runs_are_cut_into() -> None:
             other, _ = update(ALL, other, Measured(stamps[j:j + 5], values[j:j + 5]))
         item = Predicted(k * 20_000_000, SPEED, np.array([90.0]), True)
         (one, first), (other, second) = update(ALL, one, item), update(ALL, other, item)
-        results[0] += [first] if first else []
-        results[1] += [second] if second else []
-    first, second = ([(e.scale, e.lower, e.upper) for e in found[2:]] for found in results)
-    assert first == second
+        results[0] += first
+        results[1] += second
+    bits = [[(e.scale, e.lower, e.upper) for e in found[2:]] for found in results]
+    assert bits[0] == bits[1]
     assert len(results[0]) == 9
 
 

@@ -22,6 +22,7 @@ from turnmill_core.cutting.loads import cutting_loads
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.machine.controller import axis_state_at
+from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.stability.margin import stability_margin
@@ -36,6 +37,7 @@ from turnmill_ros.conversions import (
     margin_from_message,
     operation_to_message,
     time_from_message,
+    wrench_to_message,
 )
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.nodes import _support as support
@@ -163,6 +165,41 @@ def test_the_force_predictor_publishes_what_the_core_computes(probe: Probe) -> N
     probe.publish(topics.JOINT_STATES, axes_to_message(far, ros_types()))
     assert probe.until(lambda: any("no prediction" in s.message and "axis b" in s.message
                                    for s in probe.statuses("force_predictor")))
+
+
+def test_the_force_predictor_estimates_the_scale_of_the_force_coefficients(probe: Probe) -> None:
+    """Force channels of sensor blocks and a dynamometer's wrench, 1.2 times the prediction."""
+    op = operation()
+    publish_operation(probe, op)
+    probe.listen(topics.FORCE_SCALE)
+    for topic in (topics.JOINT_STATES, topics.SENSOR_BLOCKS, topics.WRENCH_MEASURED):
+        probe.announce(topic)
+    predictor = probe.add(ForcePredictor, match=["joint_states=1", "sensor_blocks=1", "wrench/measured=1"])
+    assert support.start(predictor)
+    start = 10**12
+    loads = cutting_loads(op, op.conditions)
+    force = 1.2 * loads.force_tool_mean
+    channels = tuple(Channel(f"force_{axis}", "force", "N", "dynamometer") for axis in "xyz")
+    for k in range(60):
+        stamp = start + k * 20_000_000
+        samples = np.tile(force, (20, 1)).astype(np.float32)
+        probe.publish(topics.SENSOR_BLOCKS, block_to_message(
+            SensorBlock(stamp, "dyno", 1, 20 * k, 1000.0, channels, samples), ros_types()))
+        for j in range(10):
+            probe.publish(topics.WRENCH_MEASURED, wrench_to_message(
+                1.2 * loads.force_machine_mean, np.zeros(3), stamp + j * 2_000_000, "machine", ros_types()))
+        probe.publish(topics.JOINT_STATES, axes_to_message(axis_state_at(op, k * 0.02, stamp), ros_types()))
+    heard = probe.heard["force_scale"]
+    assert probe.until(lambda: len(heard) == 10)
+    found = {source: [m for m in heard if m.source == source] for source in {m.source for m in heard}}
+    assert set(found) == {"dyno: force_x, force_y, force_z", "wrench/measured"}
+    for messages in found.values():
+        assert [m.reason != "" for m in messages] == [True, True, False, False, False]
+        assert messages[-1].scale == pytest.approx(1.2, rel=1e-6)
+        assert messages[-1].lower <= 1.2 + 1e-6
+        assert messages[-1].operation_hash == op.sha256
+        np.testing.assert_allclose(messages[-1].measured, 1.2 * np.array(messages[-1].predicted), rtol=1e-5)
+    assert {m.header.frame_id for m in found["wrench/measured"]} == {"machine"}
 
 
 def test_the_stability_monitor_answers_and_repeats_an_unchanged_cut_cheaply(probe: Probe) -> None:

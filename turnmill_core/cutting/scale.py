@@ -33,7 +33,8 @@ class ScaleConfig:
     window [s]: length of the windows on a fixed grid of time, of which whole tool revolutions are averaged;
     memory [s]: time in which an old window loses its weight by the factor e; offset: estimate a constant in
     each component; least: predicted magnitude [N, N m or W] below which there is no cut to measure; fewest: windows
-    in the cut before a scale is given; samples_per_revolution: fewest that give a mean; confidence: of the interval.
+    in the cut before a scale is given; samples_per_revolution: fewest that give a mean; patience [s]: how long a
+    window waits for measured samples; confidence: of the interval.
     """
 
     window: float = 0.2
@@ -42,10 +43,11 @@ class ScaleConfig:
     least: float = 1.0
     fewest: int = 3
     samples_per_revolution: float = 8.0
+    patience: float = 2.0
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
-        for name, unit in (("window", "s"), ("memory", "s"), ("least", "")):
+        for name, unit in (("window", "s"), ("memory", "s"), ("least", ""), ("patience", "s")):
             value = getattr(self, name)
             require(math.isfinite(value) and value > 0, f"scale {name}", value, unit, "a finite number > 0")
         require(self.fewest >= 2, "scale fewest", self.fewest, "windows", "at least 2")
@@ -80,7 +82,7 @@ class Measured:
 class ScaleEstimate:
     """The scale after a window.
 
-    end_ns: end of the window; measured, predicted (k,): means over its whole revolutions, NaN without samples;
+    end_ns: end of the window; measured, predicted (k,): means over its whole revolutions, measured empty without;
     scale with its interval (lower, upper), NaN where reason says why there is none; windows: effective number of
     windows in the cut behind it; offset (k,): 0 unless estimated.
     """
@@ -102,12 +104,11 @@ class ScaleState:
 
     sums (2, 7, k): of the windows, with their weights and with these squared: weight, weight in the cut, load,
     measured, load squared, load times measured, measured squared; updated_ns: end of the last window in them;
-    window: number of the open one, -1 before the first; measured, predicted: what has arrived for it and after it.
+    measured, predicted: what has arrived for the windows that are not complete.
     """
 
     sums: Array
     updated_ns: int = 0
-    window: int = -1
     measured: tuple[Measured, ...] = ()
     predicted: tuple[Predicted, ...] = ()
 
@@ -120,32 +121,48 @@ def initial(components: int) -> ScaleState:
 
 def update(
     config: ScaleConfig, state: ScaleState, item: Predicted | Measured
-) -> tuple[ScaleState, ScaleEstimate | None]:
-    """Take measured samples, or a prediction; the prediction that lies beyond the open window closes it.
+) -> tuple[ScaleState, tuple[ScaleEstimate, ...]]:
+    """Take measured samples or a prediction, and give the estimates of the windows that are then complete.
 
-    Each kind comes in the order of its stamps; samples later than the end of their window are left out.
-    Raises ValueError for a wrong number of components.
+    A window is complete once predictions and measured samples reach its end, or predictions go beyond it by
+    `patience`. Each kind comes in the order of its stamps; which kind is ahead does not matter. Samples that come after
+    their window are left out. Raises ValueError for a wrong number of components.
     """
     size = state.sums.shape[2]
     if isinstance(item, Measured):
         require(item.samples.shape[1] == size, "measured samples", item.samples.shape, "", f"an array (n, {size})")
-        return replace(state, measured=(*state.measured, item)), None
-    require(np.shape(item.load) == (size,), "predicted load", np.shape(item.load), "", f"an array ({size},)")
-    number = item.stamp_ns // round(config.window * 1e9)
-    if number == state.window or state.window < 0:
-        return replace(state, window=number, predicted=(*state.predicted, item)), None
-    state, estimate = _closed(config, state)
-    return replace(state, window=number, predicted=(item,)), estimate
+        state = replace(state, measured=(*state.measured, item))
+    else:
+        require(np.shape(item.load) == (size,), "predicted load", np.shape(item.load), "", f"an array ({size},)")
+        state = replace(state, predicted=(*state.predicted, item))
+    found = []
+    while state.predicted and _complete(config, state):
+        state, estimate = _closed(config, state)
+        found.append(estimate)
+    return state, tuple(found)
+
+
+def _window(config: ScaleConfig, stamp_ns: int) -> int:
+    return stamp_ns // round(config.window * 1e9)
+
+
+def _complete(config: ScaleConfig, state: ScaleState) -> bool:
+    """Whether the window of the oldest prediction can be judged."""
+    end = (_window(config, state.predicted[0].stamp_ns) + 1) * round(config.window * 1e9)
+    ahead = state.predicted[-1].stamp_ns - end
+    covered = bool(state.measured) and state.measured[-1].stamps_ns[-1] >= end
+    return ahead >= 0 and (covered or ahead >= config.patience * 1e9)
 
 
 def _closed(config: ScaleConfig, state: ScaleState) -> tuple[ScaleState, ScaleEstimate]:
-    """The state without the open window, and what that gives."""
-    length = round(config.window * 1e9)
-    begin, end = state.window * length, (state.window + 1) * length
-    speed = float(np.mean([p.tool_speed for p in state.predicted]))
-    load = np.mean([p.load for p in state.predicted], axis=0)
+    """The state without the window of the oldest prediction, and what that window gives."""
+    length, number = round(config.window * 1e9), _window(config, state.predicted[0].stamp_ns)
+    begin, end = number * length, (number + 1) * length
+    within = [p for p in state.predicted if p.stamp_ns < end]
+    speed = float(np.mean([p.tool_speed for p in within]))
+    load = np.mean([p.load for p in within], axis=0)
     measured, reason = _mean(config, state.measured, begin, speed)
-    cuts = [p.in_cut for p in state.predicted]
+    cuts = [p.in_cut for p in within]
     sums, updated = state.sums, state.updated_ns
     if not reason and any(cuts) and not all(cuts):
         reason = "the cut begins or ends in the window"
@@ -155,8 +172,8 @@ def _closed(config: ScaleConfig, state: ScaleState) -> tuple[ScaleState, ScaleEs
         sums, updated = _added(config, state, end, load, measured, any(cuts)), end
     if not reason and not any(cuts):
         reason = "no cut"
-    rest = tuple(m for m in state.measured if m.stamps_ns[-1] >= end)
-    kept = ScaleState(sums, updated, state.window, rest)
+    kept = ScaleState(sums, updated, tuple(m for m in state.measured if m.stamps_ns[-1] >= end),
+                      state.predicted[len(within):])
     return kept, _estimate(config, sums, ScaleEstimate(
         end, read_only(measured), read_only(load), math.nan, math.nan, math.nan, 0.0, np.zeros_like(load), reason))
 
@@ -164,7 +181,7 @@ def _closed(config: ScaleConfig, state: ScaleState) -> tuple[ScaleState, ScaleEs
 def _mean(config: ScaleConfig, runs: tuple[Measured, ...], begin: int, speed: float) -> tuple[Array, str]:
     """Mean over the whole revolutions that fit into the window from `begin` [ns], or why there is none."""
     turns = math.floor(speed * config.window / (2 * math.pi) + 1e-9)
-    nothing = np.full(runs[0].samples.shape[1] if runs else 1, math.nan)
+    nothing = np.empty(0)
     if turns == 0:
         return nothing, "less than one tool revolution in a window"
     end = begin + round(turns * 2 * math.pi / speed * 1e9)

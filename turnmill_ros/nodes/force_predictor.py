@@ -1,20 +1,29 @@
-"""Predicts forces, torques and powers from the operation and the axis states."""
+"""Predicts forces, torques and powers from the operation and the axis states, and compares them with measured ones."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 
-from turnmill_core.cutting.loads import CuttingLoads, cutting_loads
-from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool
-from turnmill_core.operation import Conditions, Operation
+from turnmill_core.cutting.loads import CuttingLoads
+from turnmill_core.cutting.scale import ScaleEstimate
+from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool, nominal_axes
+from turnmill_core.operation import Operation
 from turnmill_ros import topics
-from turnmill_ros.conversions import axes_from_message, loads_to_message, scalar_to_message, wrench_to_message
+from turnmill_ros.conversions import (
+    axes_from_message,
+    block_from_message,
+    loads_to_message,
+    scalar_to_message,
+    scale_to_message,
+    wrench_to_message,
+)
 from turnmill_ros.interfaces import ros_types
+from turnmill_ros.loads_follower import LoadsFollower
+from turnmill_ros.measured import Comparison, Source
 from turnmill_ros.node_table import LOAD_PLOTS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.operation_track import OperationTrack
@@ -22,21 +31,25 @@ from turnmill_ros.parameters import declare
 
 
 class ForcePredictor(LifecycleNode):
-    """Publishes loads at most `rate` times a second of axis time, stamped as the axis state they belong to."""
+    """Publishes loads at most `rate` times a second of axis time, stamped as the axis state they belong to.
+
+    Where force, torque or power is measured, the scale of the force coefficients comes with every window of it.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("force_predictor", **kwargs)
-        self._period_ns = round(1e9 / declare(
-            self, "rate", topics.CUTTING_LOADS.rate, "Hz, predictions per second of axis time", low=1.0, high=250.0))
+        self._rate = declare(
+            self, "rate", topics.CUTTING_LOADS.rate, "Hz, predictions per second of axis time", low=1.0, high=250.0)
         self._match, lossless = support.declare_common(self)
-        self._operations, self._next_ns = OperationTrack(), 0
+        self._operations, self._follower, self._comparison = OperationTrack(), LoadsFollower(self._rate), Comparison()
         self._received, self._sent, self._refused = 0, 0, ""
         self._out = {topic: support.publisher(self, topic, keep_all=lossless) for topic in (
-            topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, *LOAD_PLOTS)}
-        self._loads = lru_cache(maxsize=64)(cutting_loads)
-        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None, paced=lossless)
+            topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, topics.FORCE_SCALE, *LOAD_PLOTS)}
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes)
+        support.subscription(self, topics.SENSOR_BLOCKS, self.on_block)
+        support.subscription(self, topics.WRENCH_MEASURED, self.on_wrench)
 
     def on_operation(self, message: Any) -> None:
         """Predict for another operation from its stamp on."""
@@ -46,13 +59,13 @@ class ForcePredictor(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> None:
         """Compile the force model on the operation that is published."""
         operation = support.wait_for_operation(self, self._operations)
-        self._loads(operation, operation.conditions)
+        self._follower.loads(operation, nominal_axes(operation))
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:
         """Wait for axis states."""
         support.wait_until_matched(self, self._match)
-        self._next_ns = 0
+        self._follower, self._comparison = LoadsFollower(self._rate), Comparison()
         self.diagnostics.enter(support.ACTIVE)
 
     @support.transition
@@ -66,24 +79,36 @@ class ForcePredictor(LifecycleNode):
         """Predict the loads of an axis state, if it is time to."""
         self._received += 1
         stamp = support.stamp_ns(message)
-        if stamp >= self._next_ns or stamp < self._next_ns - 10 * self._period_ns:
-            axes = axes_from_message(message)
-            self._next_ns = axes.stamp_ns + self._period_ns
-            operation = self._operations.at(axes.stamp_ns)
-            if operation is not None:
-                self._predict(operation, axes)
-
-    def _predict(self, operation: Operation, axes: Any) -> None:
+        operation = self._operations.at(stamp)
+        if not self._follower.due(stamp) or operation is None:
+            return
+        axes = axes_from_message(message)
         try:
-            cut = rounded(conditions_from_axes(operation, axes))
-            loads = self._loads(operation, cut)
+            loads = self._follower.loads(operation, axes)
+            rotation = machine_from_tool(operation, conditions_from_axes(operation, axes))
             self._refused = ""
         except ValueError as error:
             self._refused = f"no prediction: {error}"
             return
-        for topic, message in messages(loads, machine_from_tool(operation, cut), axes.stamp_ns):
-            support.send(self._out[topic], message)
+        for topic, out in messages(loads, rotation, stamp):
+            support.send(self._out[topic], out)
         self._sent += 1
+        self._publish(self._comparison.add_loads(loads, axes.velocity[5], stamp), operation)
+
+    def on_block(self, message: Any) -> None:
+        """Take measured force, torque and power."""
+        block = block_from_message(message)
+        self._publish(self._comparison.add_block(block), self._operations.at(block.stamp_ns))
+
+    def on_wrench(self, message: Any) -> None:
+        """Take a measured force."""
+        found = self._comparison.add_wrench(topics.WRENCH_MEASURED.name, message)
+        self._publish(found, self._operations.at(support.stamp_ns(message)))
+
+    def _publish(self, found: list[tuple[Source, ScaleEstimate]], operation: Operation | None) -> None:
+        for source, estimate in found:
+            support.send(self._out[topics.FORCE_SCALE], scale_to_message(
+                estimate, source, operation.sha256 if operation else "", ros_types()))
 
     def _values(self) -> dict[str, object]:
         return {"joint_states_received": self._received, "cutting_loads_sent": self._sent}
@@ -104,17 +129,6 @@ def messages(loads: CuttingLoads, rotation: NDArray[np.float64], stamp_ns: int) 
             loads.force_machine_mean, rotation @ torque, stamp_ns, "machine", types)),
         *((topic, scalar_to_message(value, types)) for topic, value in zip(LOAD_PLOTS, scalars, strict=True)),
     ]
-
-
-def rounded(conditions: Conditions) -> Conditions:
-    """Conditions with nine significant digits, so that rounding in the axis positions is no new cut."""
-    def nine(value: float) -> float:
-        return float(f"{value:.9g}")
-
-    lower, upper = conditions.cross_feed_span
-    return Conditions(
-        nine(conditions.tool_speed), nine(conditions.workpiece_speed), nine(conditions.depth),
-        nine(conditions.feed_speed), (nine(lower), nine(upper)), nine(conditions.effective_radius))
 
 
 if __name__ == "__main__":
