@@ -22,7 +22,7 @@ from turnmill_core.prediction import PredictedType
 MESSAGES = Path(str(files("turnmill_ros"))) / "msg_schemas"
 NAMES = sorted(str(p.relative_to(MESSAGES)) for kind in ("msg", "srv") for p in (MESSAGES / kind).iterdir())
 # Every physical quantity begins its comment with its unit; counts, ids and words have none.
-UNIT = re.compile(r"^(1|Hz|rad/s|m|s|N|N m|W|m/s|m3/s|channel's unit)(, |; |$)|, channel's unit$")
+UNIT = re.compile(r"^(1|Hz|rad/s|m|s|N|N m|W|m/s|m3/s|channel's unit)(, |; |$)|, (channel|quantity)'s unit$")
 
 
 @dataclass(frozen=True)
