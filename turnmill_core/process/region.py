@@ -68,7 +68,7 @@ class Region:
     @cached_property
     def binding(self) -> NDArray[np.intp]:
         """Index of the limit with the smallest margin, (m, n)."""
-        return self.stacked.argmin(axis=0)
+        return np.asarray(self.stacked.argmin(axis=0), dtype=np.intp)
 
     @property
     def feasible(self) -> NDArray[np.bool_]:

@@ -1,0 +1,69 @@
+"""A plan in words: limits with the units that people know, reasons, and the chosen cut as an operation file."""
+
+from __future__ import annotations
+
+import math
+
+import yaml
+
+from turnmill_core.operation import Operation
+from turnmill_core.operation_file import parse_operation
+from turnmill_core.process.limits import LimitMargin
+from turnmill_core.process.plan import Choice
+from turnmill_core.process.region import Conflict
+
+RPM = 60 / (2 * math.pi)
+
+
+def shown(value: float, unit: str, name: str = "") -> str:
+    """A limit's value with the unit that people know; `unit` is its SI unit, `name` the limit's."""
+    scale, text = {"m": (1e3, "mm"), "m/s": (60.0, "m/min"), "rad/s": (RPM, "rpm")}.get(unit, (1.0, unit))
+    if name.startswith("form error"):
+        scale, text = 1e6, "um"
+    return f"{value * scale:.5g} {text}"
+
+
+def margin_text(limit: LimitMargin) -> str:
+    """One limit of one cut: "chip load, largest: 0.38 mm of 0.4 mm, 5 % left"."""
+    value, bound = (shown(float(v), limit.unit, limit.name) for v in (limit.value, limit.bound))
+    if math.isinf(float(limit.bound)):
+        return f"{limit.name}: no limit down to the depth searched"
+    word = "at least" if limit.lower else "of"
+    return f"{limit.name}: {value} {word} {bound}, {float(limit.margin) * 100:.2g} % left"
+
+
+def conflict_text(found: Conflict) -> str:
+    """Which limits conflict, and by how much."""
+    first = found.limits[0]
+    if math.isfinite(found.asks):
+        gap = found.asks / found.allows - 1
+        return (f"{first} asks for a tool speed of at least {found.asks * RPM:.0f} rpm, {found.limits[1]} allows "
+                f"at most {found.allows * RPM:.0f} rpm: {gap * 100:.3g} % apart")
+    parts = [f"{name} {shown(value, unit, name)} (allowed: {shown(bound, unit, name)}, {-margin * 100:.3g} % beyond)"
+             for name, margin, value, bound, unit in zip(
+                 found.limits, found.margins, found.values, found.bounds, found.units, strict=True) if margin < 0]
+    where = f"at best, {found.tool_speed * RPM:.0f} rpm and {found.depth * 1e3:.3g} mm: "
+    joint = "" if len(found.limits) == 1 else f"{' and '.join(found.limits)} are not met together; "
+    return joint + where + ", ".join(parts)
+
+
+def planned_text(op: Operation, choice: Choice, note: str) -> str:
+    """The operation file of `op` with the chosen cut as its nominal one and `note` added to its sources.
+
+    The schedule, which belongs to the old cut, is left out. Raises OperationError where the text does not read back.
+    """
+    document = yaml.safe_load(op.text)
+    cut, section = choice.conditions, document["cut"]
+    section["tool_speed"] = f"{cut.tool_speed * RPM:.9g} rpm"
+    section["depth"] = f"{cut.depth * 1e3:.9g} mm"
+    if op.process == "turn-milling":
+        section["workpiece_speed"] = f"{cut.workpiece_speed * RPM:.9g} rpm"
+        section["axial_feed"] = f"{choice.op.axial_feed * 1e3:.9g} mm/rev"
+    else:
+        section["feed_per_tooth"] = f"{choice.op.feed_per_tooth * 1e3:.9g} mm"
+    document.pop("schedule", None)
+    document["name"] = f"{op.name[:190]} (planned)" if not op.name.endswith("(planned)") else op.name
+    document["sources"] = "\n".join(part for part in (str(document.get("sources", "")).strip(), note) if part)
+    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+    parse_operation(text, "the planned operation")
+    return text
