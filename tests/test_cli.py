@@ -11,7 +11,7 @@ from turnmill_ros.cli import app
 from turnmill_ros.cli.app import run
 
 COMMANDS = ("doctor", "operation", "simulate", "import", "replay", "analyze", "live", "stability", "forces", "recover",
-            "toolpath", "identify")
+            "toolpath", "identify", "lobes", "delay", "plan")
 
 
 def ask(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -101,3 +101,61 @@ def test_existing_output_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert code == 2
     assert "exists" in err
     assert there.read_bytes() == b"precious"
+
+
+def test_lobes_writes_the_same_files_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """PNG, CSV and JSON, byte for byte; and the HTML page."""
+    files = {}
+    for number in (1, 2):
+        names = [tmp_path / f"{number}.{kind}" for kind in ("png", "csv", "html")]
+        code, out, err = ask(
+            capsys, "lobes", "milling_benchmark_2dof", "--tool-speeds", "5000rpm..9000rpm", "--deepest", "1mm",
+            "--points", "8x6", "--json", "--png", str(names[0]), "--csv", str(names[1]), "--report", str(names[2]))
+        assert (code, err) == (0, "")
+        files[number] = (out, names[0].read_bytes(), names[1].read_bytes())
+        assert "tool speed [rpm]" in names[2].read_text()
+    assert files[1] == files[2]
+    found = json.loads(files[1][0])
+    assert len(found["diagrams"][0]["spectral_radius"]) == 6
+    assert len(found["tool_speeds_rad_s"]) == 8
+    assert files[1][2].count(b"\n") == 49
+    assert files[1][1].startswith(b"\x89PNG")
+
+
+def test_lobes_over_several_workpiece_speeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = ask(capsys, "lobes", "thesis_table_4_9", "--tool-speeds", "3000rpm..4000rpm", "--deepest", "4mm",
+                       "--workpiece-speeds", "6rpm,21rpm,40rpm", "--kind", "boundary", "--points", "3x2", "--json",
+                       "--png", str(tmp_path / "a.png"), "--csv", str(tmp_path / "a.csv"))
+    parts = json.loads(out)["diagrams"]
+    assert code == 0
+    assert [round(p["workpiece_speed_rad_s"] * 30 / 3.14159265) for p in parts] == [6, 21, 40]
+    assert all(len(p["stable_depths_m"]) == 3 for p in parts)
+    assert "stable from [mm]" in (tmp_path / "a.csv").read_text()
+
+
+def test_delay_shows_every_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = ask(capsys, "delay", "thesis_table_4_9", "--workpiece-speed", "21rpm", "--json",
+                       "--report", str(tmp_path / "delay.html"))
+    found = json.loads(out)
+    assert code == 0
+    assert set(found["delay_s"]) == {
+        "milling", "mean", "discrete-literal", "discrete-consistent", "first-principles", "exact"}
+    assert found["delay_s"]["mean"][0] == pytest.approx(60 / 3350 / 2 * (1 + 21 / 3350))
+    assert "tool speed / workpiece speed" in (tmp_path / "delay.html").read_text()
+
+
+@pytest.mark.parametrize(("arguments", "word"), [
+    (("lobes", "thesis_table_4_9", "--tool-speeds", "2000rpm"), "FROM..TO"),
+    (("lobes", "thesis_table_4_9", "--tool-speeds", "2000rpm..1000rpm"), "above the first"),
+    (("lobes", "thesis_table_4_9", "--points", "200y100"), "200x100"),
+    (("lobes", "thesis_table_4_9", "--deepest", "60mm"), "radius"),
+    (("delay", "milling_benchmark_1dof"), "turn-milling"),
+    (("stability", "thesis_table_4_9", "--samples", "-1"), "--samples"),
+])
+def test_impossible_stability_questions(
+    arguments: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, _, err = ask(capsys, *arguments)
+    assert code == 2
+    assert word in err
+    assert err.count("\n") == 1

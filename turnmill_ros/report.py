@@ -63,7 +63,7 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
         f"<p class=note>{escape(str(analysis.path.name))}, recorded {iso_time(start)}, "
         f"judged channel {escape(channel or 'none')}</p>",
         f"<p><b>{escape(text)}</b></p>", _timeline_table(analysis), _summary_table(analysis),
-    ], plots, [_operation_tables(analysis.operation)])
+    ], plots, [operation_tables(analysis.operation)])
 
 
 def forces_report(output: Path, op: Operation, cut: Conditions, loads: CuttingLoads) -> None:
@@ -73,7 +73,7 @@ def forces_report(output: Path, op: Operation, cut: Conditions, loads: CuttingLo
         f"<h1>{escape(op.name)}</h1>",
         f"<p class=note>tool {cut.tool_speed * RPM:g} rpm, workpiece {cut.workpiece_speed * RPM:g} rpm, "
         f"depth {cut.depth * 1e3:g} mm</p>",
-    ], plots, [_operation_tables(op)])
+    ], plots, [operation_tables(op)])
 
 
 def _named(channel: Any) -> str:
@@ -148,7 +148,8 @@ def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
     return plots
 
 
-def _operation_tables(op: Operation) -> str:
+def operation_tables(op: Operation) -> str:
+    """The operation as tables of HTML."""
     parts = [f"<h2>Operation</h2><p class=note>sha256 {op.sha256}</p>"]
     for section, rows in describe(op):
         parts.append(f"<h3>{escape(section)}</h3>"
@@ -172,9 +173,14 @@ def write_page(
 
 def write_text(output: Path, text: str) -> None:
     """Write a text file under its final name only when it is whole."""
+    write_bytes(output, text.encode())
+
+
+def write_bytes(output: Path, data: bytes) -> None:
+    """Write a file under its final name only when it is whole."""
     part = output.with_name(output.name + ".part")
     try:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(data)
         os.replace(part, output)
     finally:
         part.unlink(missing_ok=True)

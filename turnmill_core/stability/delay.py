@@ -93,7 +93,7 @@ def first_principles_delay(
     material against the feed direction x. To first order Td (1 - v cos(phi) / (R_t Omega_t)).
     exact: solve v tau cos(phi) = R_t sin(Omega_t (Td - tau)), which follows from intersecting the
     tool's radius with the circle of the preceding tooth, by Newton's method. Raises ``ValueError``
-    when the surface is as fast as the cutting edge.
+    when the surface is as fast as the cutting edge, or so fast that the preceding tooth did not pass there at all.
     """
     ratio = delay_variation(tool_radius, tool_speed, surface_speed)
     if ratio >= 1:
@@ -110,6 +110,9 @@ def first_principles_delay(
             delay = delay - step
             if np.all(np.abs(step) <= 1e-14 * period):
                 break
+        if not np.all((np.abs(step) <= 1e-9 * period) & (np.abs(tool_speed * (period - delay)) < np.pi / 2)):
+            raise ValueError(f"surface speed is {surface_speed} m/s, expected a speed at which the preceding tooth "
+                             "passed the point that is being cut")
     return delay
 
 
@@ -134,3 +137,18 @@ def delay_curve(
         surface = abs(workpiece_speed) * (workpiece_radius - 0.5 * depth)
         return first_principles_delay(pitch, tool_speed, tool_radius, surface, at, model == "exact")
     raise ValueError(f"delay model is {model!r}, expected one of {', '.join(DELAY_CURVES)}")
+
+
+def delay_statistics(
+    model: DelayCurve, pitch: float, tool_speed: float, workpiece_speed: float, tool_radius: float,
+    workpiece_radius: float, depth: float, angle: ArrayLike,
+) -> tuple[float, float]:
+    """Mean over `angle` in tooth periods [1] and (largest - smallest) / mean [1] of delay_curve.
+
+    Both NaN where the model does not hold: a bar thinner than the cut, a surface as fast as the edge.
+    """
+    try:
+        curve = delay_curve(model, pitch, tool_speed, workpiece_speed, tool_radius, workpiece_radius, depth, angle)
+    except ValueError:
+        return float("nan"), float("nan")
+    return float(curve.mean() * tool_speed / pitch), float(np.ptp(curve) / curve.mean())

@@ -56,7 +56,7 @@ def crossing(
     family: DepthFamily, tool_speed: float | None, bracket: Floats, multipliers: NDArray[np.complex128],
     tolerance: float,
 ) -> tuple[float, complex]:
-    """Depth [m] where |mu| = 1 between the two depths of `bracket` (2,), and the leading multiplier of its unstable end.
+    """Depth [m] where |mu| = 1 between the depths of `bracket` (2,), and the leading multiplier of its unstable end.
 
     multipliers (2,): leading ones at the bracket's ends. The secant's guess and a neighbour on either side are solved
     together and close in on it. tool_speed [rad/s] (None: the family's). tolerance: of the bracket, relative to the

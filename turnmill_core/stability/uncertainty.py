@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,12 +47,13 @@ class LimitDistribution:
 
 def limit_distribution(
     op: Operation, conditions: Conditions, spread: Spread | None = None, samples: int = 50, seed: int = 0,
-    delay_model: DelayModel = "mean",
+    delay_model: DelayModel = "mean", progress: Callable[[int, int], None] | None = None,
 ) -> LimitDistribution:
     """Depth limits of `op` at `conditions` with modes and coefficients drawn from log-normal distributions.
 
     spread: None for the defaults. samples, seed: number of draws and their seed; equal arguments give equal results.
-    delay_model: as in stability_problem. Raises ``ValueError`` as stability_problem does.
+    delay_model: as in stability_problem. progress: called with (done, total) draws. Raises ``ValueError`` as
+    stability_problem does.
     """
     require(samples >= 1, "samples", samples, "", "an integer >= 1")
     rng, spread = np.random.default_rng(seed), spread or Spread()
@@ -62,6 +64,8 @@ def limit_distribution(
         intervals = stable_depths(family, scan=SCAN_DEPTHS, tolerance=1e-3).intervals
         limits[i] = depth_limit(intervals, conditions.depth)
         stable += bool(np.any((intervals[:, 0] <= conditions.depth) & (conditions.depth <= intervals[:, 1])))
+        if progress is not None:
+            progress(i + 1, samples)
     return LimitDistribution(np.sort(limits), stable / samples)
 
 
@@ -71,9 +75,14 @@ def sampled(op: Operation, spread: Spread, rng: np.random.Generator) -> Operatio
         return float(np.exp(sigma * rng.standard_normal()))
 
     def structure(old: Structure) -> Structure:
-        return replace(old, modes=tuple(
-            Mode(m.frequency * draw(spread.frequency), min(m.damping * draw(spread.damping), 0.99),
-                 m.mass * draw(spread.mass), m.shape) for m in old.modes))
+        factors = [(draw(spread.frequency), draw(spread.damping), draw(spread.mass)) for _ in old.modes]
+
+        def moved(modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
+            return tuple(replace(m, frequency=m.frequency * f, damping=min(m.damping * z, 0.99), mass=m.mass * w)
+                         for m, (f, z, w) in zip(modes, factors, strict=True))
+
+        table = old.table and replace(old.table, modes=tuple(moved(modes) for modes in old.table.modes))
+        return replace(old, modes=moved(old.modes), table=table)
 
     m, c = op.material, spread.coefficient
     material = Material(m.name, m.Ktc * draw(c), m.Krc * draw(c), m.Kac * draw(c), m.Kte, m.Kre, m.Kae)

@@ -1,4 +1,4 @@
-"""Commands that ask the model: operation, stability."""
+"""The command operation: check, list and describe operation files."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ import json
 import math
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from turnmill_ros.cli.cut_options import RPM, Depth, ToolSpeed, WorkpieceSpeed, asked, title
-from turnmill_ros.cli.output import JsonFlag, OperationArgument, SetOption, console, print_json, table
+from turnmill_ros.cli.output import JsonFlag, SetOption, console, print_json, table
 from turnmill_ros.errors import InputError
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this module to `app`."""
     app.command()(operation)
-    app.command()(stability)
 
 
 def operation(
@@ -74,43 +71,3 @@ def _list_alloys(as_json: bool) -> None:
             (a.rake_angle, a.chip_thickness, a.cutting_speed), scales, strict=True))) for a in ALLOYS.values()))
     for alloy in ALLOYS.values():
         console.print(f"{alloy.name}: {alloy.source}", soft_wrap=True, markup=False)
-
-
-def stability(
-    op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
-    depth: Depth = None, changes: SetOption = None, as_json: JsonFlag = False,
-) -> None:
-    """Is this cut stable, by how much, and of what kind would the chatter be.
-
-    Example: turnmill stability thesis_table_4_9 --tool-speed 3350rpm --workpiece-speed 6rpm --depth 1.2mm
-    """
-    from turnmill_core.stability.margin import stability_margin
-
-    op, cut = asked(op_name, changes, tool_speed, workpiece_speed, depth)
-    margin = stability_margin(op, cut)
-    kind = margin.predicted_type.name
-    if as_json:
-        print_json({
-            "operation": op.name, "operation_sha256": op.sha256, "predicted_type": kind,
-            "tool_speed_rad_s": cut.tool_speed, "workpiece_speed_rad_s": cut.workpiece_speed, "depth_m": cut.depth,
-            "spectral_radius": margin.spectral_radius, "depth_limit_m": margin.depth_limit,
-            "stable_depths_m": margin.stable_depths, "depth_searched_m": margin.depth_searched,
-            "depth_ratio": margin.depth_ratio, "chatter_frequency_hz": margin.chatter_frequency,
-            "multipliers": [[m.real, m.imag] for m in np.atleast_1d(margin.multipliers).tolist()],
-            "principal_period_s": margin.principal_period, "delay_s": margin.delay,
-            "nearest_stable_speed_rad_s": margin.nearest_stable_speed,
-        })
-        return
-    islands = ", ".join(f"{low * 1e3:.3f} to {high * 1e3:.3f}" for low, high in margin.stable_depths)
-    at_least = "at least " if margin.depth_limit >= margin.depth_searched else ""
-    table(title(op, cut), ("quantity", "value"), [
-        ("verdict", kind),
-        ("largest |Floquet multiplier|", f"{margin.spectral_radius:.5f}"),
-        ("depth limit", f"{at_least}{margin.depth_limit * 1e3:.3f} mm"),
-        ("stable depths", f"{islands or 'none'} mm"),
-        ("depth / limit", f"{margin.depth_ratio:.3f}"),
-        ("chatter frequency", "-" if math.isnan(margin.chatter_frequency) else f"{margin.chatter_frequency:.1f} Hz"),
-        ("regeneration delay", f"{margin.delay * 1e3:.4f} ms"),
-        ("nearest stable tool speed at this depth",
-         "none found" if math.isnan(margin.nearest_stable_speed) else f"{margin.nearest_stable_speed * RPM:.0f} rpm"),
-    ])

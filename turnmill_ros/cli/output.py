@@ -91,10 +91,11 @@ def new_file(path: Path, force: bool = False) -> Path:
 
 @contextmanager
 def progress(text: str, quiet: bool = False) -> Iterator[Callable[[float], None]]:
-    """Progress bar on stderr; the yielded function takes the done share in [0, 1]."""
+    """Progress bar on stderr where that is a terminal; the yielded function takes the done share in [0, 1]."""
+    terminal = Console(stderr=True)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True), transient=True, disable=quiet,
+        console=terminal, transient=True, disable=quiet or not terminal.is_terminal,
     ) as bars:
         task = bars.add_task(text, total=1.0)
         yield lambda share: bars.update(task, completed=min(1.0, share))
