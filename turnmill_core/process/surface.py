@@ -11,6 +11,9 @@ from turnmill_core.cutting.chip import prepare_cut
 from turnmill_core.cutting.forces import revolve
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation, require
+from turnmill_core.process.linear import linear_map
+from turnmill_core.process.linear_cut import linear_cut
+from turnmill_core.process.periodic_orbit import periodic_orbit
 from turnmill_core.process.surface_profile import circularity_error, static_cusp, surface_feed_per_tooth
 from turnmill_core.structure.at import plain_structures, structure_at
 
@@ -95,3 +98,15 @@ def printed_extremes(op: Operation, conditions: Conditions, angle: Floats, axial
     printing = np.any(turned <= arcs.exit[0, 0] - arcs.start[0, 0], axis=1)
     chosen = axial[printing] if printing.any() else axial
     return float(max(0.0, chosen.max())), float(max(0.0, -chosen.min()))
+
+
+def steady_axial(op: Operation, conditions: Conditions, steps: int | None = None) -> tuple[Floats, Floats]:
+    """Steady vibration along the tool axis over a tool revolution, from the periodic orbit of the linear cut.
+
+    steps: of the map over its period (None: default_steps). Returns tool angle [rad] (p,), equally spaced from 0, and
+    displacement [m] (p,) of the tool against the workpiece along +z_T; zeros where no mode moves along the axis.
+    """
+    if not moves_axially(op, conditions):
+        return np.zeros(1), np.zeros(1)
+    steady = periodic_orbit(linear_map(linear_cut(op, conditions), steps))
+    return steady.angle, steady.relative[:, 2]
