@@ -16,14 +16,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from .operation_checks import finite, not_negative, positive, require
-from .operation_cutter import CYLINDER, Shape, check_shape, require_bar_profile
+from .operation_cutter import CYLINDER, Outline, Shape, check_shape, outline, require_bar_profile
 from .operation_limits import NO_LIMITS, Limits
 from .operation_stability import ProcessDamping, Trial
 from .operation_structure import RIGID, RIGID_IN_MACHINE, Beam, Frame, Mode, Structure, Vector, check_beam
 
 __all__ = [
-    "CYLINDER", "RIGID", "Conditions", "Frame", "Material", "Mode", "Operation", "Process", "SchedulePoint", "Shape",
-    "Structure", "Tool", "Vector", "Workpiece", "require",
+    "CYLINDER", "RIGID", "Conditions", "Frame", "Material", "Mode", "Operation", "Outline", "Process", "SchedulePoint",
+    "Shape", "Structure", "Tool", "Vector", "Workpiece", "outline", "require",
 ]
 
 Process = Literal["milling", "turn-milling"]

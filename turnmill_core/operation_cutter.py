@@ -62,6 +62,11 @@ class Shape:
         for value in self.axial_runout:
             finite("axial runout", value, "m")
 
+    @property
+    def is_cylinder(self) -> bool:
+        """True where the edges around the tool are those of a cylinder, whatever the bottom; teeth with one helix."""
+        return not (self.corner_radius or self.tip_angle or self.taper_angle or self.helix_angles)
+
 
 CYLINDER = Shape()
 

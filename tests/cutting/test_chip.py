@@ -27,7 +27,7 @@ from turnmill_core.operation import Operation, Tool
 def angles(op: Operation, count: int, elements: int) -> np.ndarray:
     cut = prepare_cut(op, op.conditions, elements)
     spindle = np.arange(count) * (2 * math.pi / count)
-    return spindle[:, None, None] + cut.elements.offset[None, :, None] - cut.elements.lag[None, None, :]
+    return spindle[:, None, None] + cut.elements.offset[None, :, None] - cut.elements.lag[None]
 
 
 def test_feed_grows_with_the_distance_from_the_c_axis() -> None:
@@ -60,8 +60,8 @@ def test_static_chip_times_edge_speed_is_the_volume_of_the_side() -> None:
     cut = prepare_cut(op, op.conditions, 400)
     s, e = cut.engagement.start, cut.engagement.exit
     # chip of tooth j: (f . n) tau_j, integrated over the arcs in closed form
-    per_second = cut.feed[:, :1] * (np.cos(s) - np.cos(e)) + cut.feed[:, 1:] * (np.sin(e) - np.sin(s))
-    area = op.tool.radius * (per_second.sum(axis=1) * cut.elements.thickness).sum() * cut.delay.sum()
+    per_second = cut.feed[:, :1] * (np.cos(s) - np.cos(e)) + cut.feed[:, 1:2] * (np.sin(e) - np.sin(s))
+    area = op.tool.radius * (per_second.sum(axis=1) * cut.elements.width).sum() * cut.delay[0].sum()
     revolutions = op.conditions.tool_speed / (2 * math.pi)
     assert area * revolutions == pytest.approx(removal(op, op.conditions).side, rel=2e-4)
 
@@ -164,7 +164,7 @@ def test_exact_chip_area_is_the_volume_removed() -> None:
         h = exact_chip(cut, phi)
         # area swept by the chip's section: its points move with rho Omega_t + f.e along the path
         along = (cut.feed[:, 0] * np.cos(phi) - cut.feed[:, 1] * np.sin(phi)) / op.conditions.tool_speed
-        area = (h * (cut.elements.radius[:, None] - h / 2) + h * along) * cut.elements.thickness
+        area = (h * (cut.elements.radius + cut.elements.runout[:, None] - h / 2) + h * along) * cut.elements.width
         rate = area.sum() / 3600 * op.conditions.tool_speed
         c, radius = op.conditions, op.tool.radius
         exit_angle = math.acos(1 - op.axial_feed / radius)

@@ -18,8 +18,8 @@ def test_edge_length_is_the_length_of_the_helix() -> None:
     psi = lag_angle(tool, z)
     curve = np.stack([tool.radius * np.cos(psi), tool.radius * np.sin(psi), z], axis=1)
     length = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
-    assert edges.length.sum() == pytest.approx(length, rel=1e-8)
-    assert edges.thickness.sum() == pytest.approx(0.012, rel=1e-12)
+    assert edges.length.sum(axis=1) == pytest.approx([length, length], rel=1e-8)
+    assert edges.width.sum() == pytest.approx(0.012, rel=1e-12)
     assert edges.height[0] == pytest.approx(0.012 / 80)
 
 
@@ -39,15 +39,15 @@ def test_tooth_angles_stand_ahead_by_the_pitches_and_behind_by_the_lag() -> None
 
 def test_predecessors_without_runout_are_the_teeth_just_ahead() -> None:
     tool = Tool("t", 0.02, 3, pitch_angles=(2.0, 2.2, 2 * math.pi - 4.2))
-    angle, step = predecessors(tool)
-    assert angle.shape == (3, 1)
-    assert angle[:, 0] == pytest.approx(tool.pitch)
+    angle, step = predecessors(tool, edge_elements(tool, 0.01, 5))
+    assert angle.shape == (5, 3, 1)
+    assert angle[3, :, 0] == pytest.approx(tool.pitch)
     assert np.all(step == 0)
 
 
 def test_predecessors_with_runout_end_with_the_tooth_itself() -> None:
     tool = Tool("t", 0.02, 3, pitch_angles=(2.0, 2.2, 2 * math.pi - 4.2), runout=(0.0, 5e-6, -3e-6))
-    angle, step = predecessors(tool)
+    angle, step = (a[0] for a in predecessors(tool, edge_elements(tool, 0.01, 5)))
     assert angle[:, -1] == pytest.approx(np.full(3, 2 * math.pi))
     assert step == pytest.approx(np.array([[-5e-6, 3e-6, 0], [8e-6, 5e-6, 0], [-3e-6, -8e-6, 0]]))
     assert angle[1] == pytest.approx([2.2, 2 * math.pi - 2.0, 2 * math.pi])

@@ -30,30 +30,46 @@ ChipModel = Literal["static", "exact"]
 
 
 @dataclass(frozen=True)
-class Cut:
-    """Everything by height that the chip of one instant needs; m heights, N teeth.
+class Bar:
+    """Material around a cylinder in the closed form's cuts.
 
-    elements: the edges; engagement: arcs of the `static` chip; feed [m/s] (m, 2), tool relative to
-    material in the tool frame; lever [m] (m,), distance of the height from the C axis; half_width
-    [m] (m,), largest |x_T| of material; sense: +1 up-milling, -1 down-milling; lead [m/rad] and
-    walls [m] (lower, upper) of the material as `axial_place` measures it, for the longest tooth;
-    lag [rad] (N, K) and delay [s] (N, K) since the k-th predecessor of each tooth passed; step [m]
-    (N, K), radius of the tooth minus that of the predecessor; tool_radius [m]; tool_speed [rad/s].
+    lever [m] (m,), distance of the height from the C axis; half_width [m] (m,), largest |x_T| of
+    material; sense: +1 up-milling, -1 down-milling; lead [m/rad] and walls [m] (lower, upper) of the
+    material as `axial_place` measures it, for the longest tooth; tool_radius [m]; lag [rad] (N, K),
+    rotation since the k-th predecessor of each tooth passed.
     """
 
-    elements: EdgeElements
-    engagement: Engagement
-    feed: Array
     lever: Array
     half_width: Array
     sense: float
     lead: float
     walls: tuple[float, float]
+    tool_radius: float
     lag: Array
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Everything by height that the chip of one instant needs; m heights, N teeth.
+
+    elements: the edges; engagement: arcs of the `static` chip; feed [m/s] (m, 3), coefficients of sin
+    phi, cos phi and 1 in the feed along the normal f . n (on a cylinder f_x, f_y, 0); delay [s] (m, N, K)
+    since the k-th predecessor of each tooth passed; step [m] (m, N, K), how far the tooth stands out
+    beyond that predecessor along the normal; tool_speed [rad/s]; origin, axis (3,): in the tool frame,
+    `axis` x (place of the tip from the C axis) [m] and the direction of the C axis, both times the sense
+    of its rotation, so that the force's moment that resists it is F . (origin + axis x r).
+    bar: what the `exact` chip needs besides, only for a cylinder in the closed form's cuts.
+    """
+
+    elements: EdgeElements
+    engagement: Engagement
+    feed: Array
     delay: Array
     step: Array
-    tool_radius: float
     tool_speed: float
+    origin: Array
+    axis: Array
+    bar: Bar | None = None
 
 
 def prepare_cut(op: Operation, conditions: Conditions, elements: int = 64) -> Cut:
@@ -71,41 +87,48 @@ def prepare_cut(op: Operation, conditions: Conditions, elements: int = 64) -> Cu
     if sense < 0:
         lower, upper = -upper, -lower
     if op.process == "turn-milling" and math.isinf(upper):
-        lower += float(edges.radius.max()) - op.tool.radius  # the longest tooth left the wall
-    angle, step = predecessors(op.tool)
+        lower += float((op.tool.radius + edges.runout).max()) - op.tool.radius  # the longest tooth left the wall
+    angle, step = predecessors(op.tool, edges)
+    feed = np.zeros((elements, 3))
+    feed[:, :2] = feed_velocity(op, conditions, edges.height)
+    turning = op.process == "turn-milling"
     return Cut(
         elements=edges,
         engagement=engagement(op, conditions, edges.height),
-        feed=read_only(feed_velocity(op, conditions, edges.height)),
-        lever=read_only(lever_arm(op, conditions, edges.height)),
-        half_width=read_only(material_half_width(op, conditions, edges.height)),
-        sense=sense,
-        lead=helix_lead(op, conditions),
-        walls=(lower, upper),
-        lag=angle,
+        feed=read_only(feed),
         delay=read_only(angle / conditions.tool_speed),
         step=step,
-        tool_radius=op.tool.radius,
         tool_speed=conditions.tool_speed,
+        origin=read_only((-conditions.effective_radius, 0.0, 0.0)),
+        axis=read_only((0.0, -1.0 if turning else 0.0, 0.0)),
+        bar=Bar(
+            lever=read_only(lever_arm(op, conditions, edges.height)),
+            half_width=read_only(material_half_width(op, conditions, edges.height)),
+            sense=sense, lead=helix_lead(op, conditions), walls=(lower, upper), tool_radius=op.tool.radius,
+            lag=angle[0],
+        ),
     )
 
 
 def static_chip(cut: Cut, phi: Array) -> Array:
     """Chip thickness of Eq. 3.44 at the tooth angles `phi` [rad] (n, N, m), engagement not applied.
 
-    h_j = min over k of [(f . n) tau_jk + r_j - r_jk], with tau_jk the time since the k-th
-    predecessor of tooth j passed and r_j - r_jk the step of their radii; for equal pitch without
-    runout h = (f . n) / (N Omega_t) (erratum M6: the feed is a length per time). Never below 0.
+    h_j = min over k of [(f . n) tau_jk + s_jk], with tau_jk the time since the k-th predecessor of
+    tooth j passed and s_jk how far the tooth stands out beyond it; for equal pitch without runout
+    h = (f . n) / (N Omega_t) (erratum M6: the feed is a length per time). Never below 0.
     """
-    normal_feed = cut.feed[:, 0] * np.sin(phi) + cut.feed[:, 1] * np.cos(phi)
-    chip = normal_feed[..., None] * cut.delay[:, None, :] + cut.step[:, None, :]
+    normal_feed = cut.feed[:, 0] * np.sin(phi) + cut.feed[:, 1] * np.cos(phi) + cut.feed[:, 2]
+    chip = normal_feed[..., None] * cut.delay.swapaxes(0, 1) + cut.step.swapaxes(0, 1)
     return np.asarray(np.maximum(chip.min(axis=-1), 0.0), dtype=np.float64)
 
 
 def largest_static_chip(cut: Cut) -> float:
     """Largest `static` chip [m] of all teeth and heights: at the end of an arc or across the feed, whichever is in."""
     arcs = cut.engagement
-    across = np.clip(np.arctan2(cut.feed[:, 0], cut.feed[:, 1])[:, None], arcs.start, arcs.exit)
+    across = np.arctan2(cut.feed[:, 0], cut.feed[:, 1])[:, None]
+    # the turn of the arc's own: at most 2 pi past its start
+    within = np.clip(arcs.start + (across - arcs.start) % (2 * math.pi), arcs.start, arcs.exit)
+    across = np.where((across > arcs.start) & (across < arcs.exit), across, within)
     phi = np.stack([arcs.start, across, arcs.exit]).transpose(0, 2, 1).reshape(-1, 1, len(arcs.start))
     cuts = np.tile((arcs.exit > arcs.start).T, (3, 1))[:, None, :]
     return float(np.where(cuts, static_chip(cut, phi), 0.0).max())
@@ -121,29 +144,38 @@ def exact_chip(cut: Cut, phi: Array) -> Array:
     which Newton's method solves to round-off. The feed is taken as straight over the lag (workpiece
     rotation of a few mrad) and the wall as smooth.
     """
+    bar = required_bar(cut)
     sine, cosine = np.sin(phi), np.cos(phi)
     along = cut.feed[:, 0] * sine + cut.feed[:, 1] * cosine
     across = cut.feed[:, 0] * cosine - cut.feed[:, 1] * sine
-    own = cut.elements.radius[:, None]
+    own = (bar.tool_radius + cut.elements.runout)[:, None]
     inner = np.zeros(np.broadcast_shapes(phi.shape))
-    for k in range(cut.lag.shape[1]):
-        radius = (cut.elements.radius - cut.step[:, k])[:, None]
-        tau = np.broadcast_to(cut.delay[:, k, None], phi.shape)
+    for k in range(bar.lag.shape[1]):
+        radius = own - cut.step[0, :, k, None]
+        tau = np.broadcast_to(cut.delay[0, :, k, None], phi.shape)
         for _ in range(4):
-            delta = cut.lag[:, k, None] - cut.tool_speed * tau
+            delta = bar.lag[:, k, None] - cut.tool_speed * tau
             tau = tau + (radius * np.sin(delta) - tau * across) / (cut.tool_speed * radius * np.cos(delta) + across)
-        inner = np.maximum(inner, radius * np.cos(cut.lag[:, k, None] - cut.tool_speed * tau) - tau * along)
+        inner = np.maximum(inner, radius * np.cos(bar.lag[:, k, None] - cut.tool_speed * tau) - tau * along)
     x = own * sine
-    outer = np.minimum(own, np.divide(cut.half_width, np.abs(sine), out=np.full(phi.shape, np.inf), where=sine != 0))
-    place = axial_place(cut.lead, cut.tool_radius, x, cut.sense * own * cosine, cut.lever)
-    slope = cut.sense * cosine - cut.lead * sine * cut.lever / (cut.lever**2 + x**2)
-    for wall, rising in ((cut.walls[0], slope > 0), (cut.walls[1], slope < 0)):
+    outer = np.minimum(own, np.divide(bar.half_width, np.abs(sine), out=np.full(phi.shape, np.inf), where=sine != 0))
+    place = axial_place(bar.lead, bar.tool_radius, x, bar.sense * own * cosine, bar.lever)
+    slope = bar.sense * cosine - bar.lead * sine * bar.lever / (bar.lever**2 + x**2)
+    for wall, rising in ((bar.walls[0], slope > 0), (bar.walls[1], slope < 0)):
         if math.isfinite(wall):
             with np.errstate(divide="ignore"):
                 bound = own - (place - wall) / slope
             inner = np.where(rising, np.maximum(inner, bound), inner)
             outer = np.where(rising, outer, np.minimum(outer, bound))
     return np.asarray(np.maximum(outer - inner, 0.0), dtype=np.float64)
+
+
+def required_bar(cut: Cut) -> Bar:
+    """The material around a cylinder; raises ValueError where the cut has none, and so no `exact` chip."""
+    if cut.bar is None:
+        raise ValueError("chip model is 'exact', expected 'static': the exact chip is that of a cylinder in orthogonal "
+                         "turn-milling or milling with a known wall")
+    return cut.bar
 
 
 def feed_per_tooth(op: Operation, conditions: Conditions) -> float:

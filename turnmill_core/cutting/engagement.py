@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from turnmill_core.cutting.feed import cross_feed_sense, feed_angle, feed_velocity
-from turnmill_core.cutting.tool import Array, lag_angle, read_only, tooth_offsets
-from turnmill_core.operation import Conditions, Operation
+from turnmill_core.cutting.tool import Array, lag_angle, read_only, require_cylinder, tooth_offsets
+from turnmill_core.operation import Conditions, Operation, require
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
@@ -26,7 +26,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 class Engagement:
     """Start and exit angles of the cut by height.
 
-    height [m] (m,) above the tool tip; start, exit [rad] (m, 2), up to two arcs at a height, each
+    height [m] (m,) above the tool tip; start, exit [rad] (m, A), the arcs at a height, two of the closed form, each
     from start to exit in the sense of rotation. The second arc exists (start < exit) only where the
     cut reaches past 90 degrees and the bar is narrower than the tool at that height; an empty arc
     has start = exit.
@@ -70,7 +70,13 @@ def engagement(op: Operation, conditions: Conditions, height: Array) -> Engageme
         op: the operation.
         conditions: the instant of the cut.
         height: heights above the tool tip [m], (m,).
+
+    Raises:
+        ValueError: the tool is no cylinder, or stands beside or tilted to the bar (see engagement_map.py).
     """
+    require_cylinder(op.tool)
+    require(op.eccentricity == 0 and op.tilt == 0, "eccentricity and tilt", (op.eccentricity, op.tilt), "m, rad",
+            "0: other cuts have no closed form")
     height = np.atleast_1d(np.asarray(height, dtype=np.float64))
     radius = op.tool.radius
     sense = cross_feed_sense(conditions)

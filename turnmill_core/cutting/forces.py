@@ -1,8 +1,10 @@
 """Forces, torque and power of a rigid cut over one tool revolution (thesis Eq. 3.45-3.54).
 
-Forces are those that the workpiece exerts on the tool, in the tool frame T, for an axial immersion
-angle of 90 degrees (Eq. 3.49, 4.66): F_x = -F_r sin(phi) - F_t cos(phi), F_y = -F_r cos(phi) +
-F_t sin(phi), F_z = -F_a.
+Forces are those that the workpiece exerts on the tool, in the tool frame T (Eq. 3.49), with the axial
+immersion angle kappa of the edge: F_x = -(F_r sin(kappa) + F_a cos(kappa)) sin(phi) - F_t cos(phi),
+F_y = -(F_r sin(kappa) + F_a cos(kappa)) cos(phi) + F_t sin(phi), F_z = F_r cos(kappa) - F_a sin(kappa).
+On a cylinder (90 degrees, Eq. 4.66) F_z = -F_a. Bottom edges have no inclination, and no force F_a
+along themselves.
 """
 
 from __future__ import annotations
@@ -12,9 +14,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from turnmill_core.cutting import _kernels
-from turnmill_core.cutting.chip import ChipModel, Cut, exact_chip, largest_static_chip, prepare_cut, static_chip
+from turnmill_core.cutting._kernels.forces import exact_forces, static_forces
+from turnmill_core.cutting.chip import (
+    ChipModel,
+    Cut,
+    exact_chip,
+    largest_static_chip,
+    prepare_cut,
+    required_bar,
+    static_chip,
+)
 from turnmill_core.cutting.feed import feed_velocity
 from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.operation import Conditions, Material, Operation, require
@@ -87,7 +98,7 @@ def revolve(
     """
     require(angles >= 4, "angles", angles, "", "an integer >= 4")
     elements = cut.elements.height.size
-    lag = abs(float(cut.elements.lag[0])) * 2
+    lag = float(np.abs(cut.elements.span).max())
     require(lag <= math.pi / 2, "elements", elements, "", f"enough for a lag of at most pi/2 in one, not {lag:.3g} rad")
     windows = _windows(cut, 2 * math.pi / angles if average else 0.0)
     result = np.zeros((angles, 5))
@@ -101,53 +112,58 @@ def revolve(
 
 
 def _windows(cut: Cut, step: float) -> tuple[Array, Array]:
-    """Angles [rad] (m, 2) over which an element comes into and goes out of the cut.
+    """Angles [rad] (N, m, A) over which an element comes into and goes out of the cut.
 
     `step` where it is given: the element stands for that part of the revolution. Otherwise the turn
     of the tool that carries an arc's end from the top of the element to its bottom, from lag and arc.
     """
     arcs = cut.engagement
+    shape = (len(cut.elements.offset), *arcs.start.shape)
     if step:
-        return np.full(arcs.start.shape, step), np.full(arcs.start.shape, step)
+        return np.full(shape, step), np.full(shape, step)
     whole = arcs.exit > arcs.start
     whole[1:] &= whole[:-1].copy()
     whole[:-1] &= whole[1:].copy()
-    lag = 2 * cut.elements.lag[0]
     windows = []
     for end in (arcs.start, arcs.exit):
         slope = np.where(whole, np.gradient(end, axis=0), 0.0) if len(end) > 1 else np.zeros(end.shape)
-        windows.append(np.clip(np.abs(slope + lag), _POINT, math.pi / 2))
+        windows.append(np.clip(np.abs(slope + cut.elements.span[..., None]), _POINT, math.pi / 2))
     return windows[0], windows[1]
 
 
-def _coefficients(material: Material) -> Array:
-    return np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae])
+def _coefficients(material: Material, bottom: NDArray[np.bool_]) -> Array:
+    """Coefficients (m, 6) by element; none along the bottom edges."""
+    one = np.array([material.Ktc, material.Krc, material.Kac, material.Kte, material.Kre, material.Kae])
+    alongside = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 0.0])
+    return np.where(bottom[:, None], one * alongside, one)
 
 
 def _fast(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, Array], result: Array) -> float:
     e, arcs = cut.elements, cut.engagement
+    coefficients = _coefficients(material, e.bottom)
     if chip == "static":
-        _kernels.static_forces(
-            len(result), *windows, e.offset, e.radius, e.lag, arcs.start, arcs.exit, cut.feed, cut.delay, cut.step,
-            e.thickness, e.length, _coefficients(material), cut.lever, result)
+        static_forces(
+            len(result), *windows, e.offset, e.runout, e.radius, e.height, e.sin_kappa, e.cos_kappa, e.lag, arcs.start,
+            arcs.exit, cut.feed, cut.delay, cut.step, e.width, e.length, coefficients, cut.origin, cut.axis, result)
         return largest_static_chip(cut)
-    return float(_kernels.exact_forces(
-        len(result), e.offset, e.radius, cut.tool_radius, e.lag, cut.feed, cut.sense, cut.lead, *cut.walls,
-        cut.half_width, cut.lag, cut.step, cut.tool_speed, e.thickness, e.length, _coefficients(material), cut.lever,
-        result))
+    bar = required_bar(cut)
+    return float(exact_forces(
+        len(result), e.offset, e.runout, bar.tool_radius, e.lag, cut.feed[:, :2], bar.sense, bar.lead, *bar.walls,
+        bar.half_width, bar.lag, cut.step[0], cut.tool_speed, e.width, e.length, coefficients[0], bar.lever, result))
 
 
 def _plain(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, Array], result: Array) -> float:
     """The kernels' numpy twin: every angle, tooth, height and arc at once."""
     e = cut.elements
     count = len(result)
-    phi = (np.arange(count) * (2 * math.pi / count))[:, None, None] + e.offset[None, :, None] - e.lag[None, None, :]
+    phi = (np.arange(count) * (2 * math.pi / count))[:, None, None] + e.offset[None, :, None] - e.lag[None]
     if chip == "exact":
         thickness = exact_chip(cut, phi)
         _sum_forces(cut, material, thickness, phi, np.ones_like(phi), result)
         return float(thickness.max())
     arcs = cut.engagement
-    for start, stop, enter, leave in zip(arcs.start.T, arcs.exit.T, windows[0].T, windows[1].T, strict=True):
+    for start, stop, enter, leave in zip(arcs.start.T, arcs.exit.T, *(np.moveaxis(w, 2, 0) for w in windows),
+                                         strict=True):
         wrapped = start - enter / 2 + (phi - start + enter / 2) % (2 * math.pi)
         outside = np.maximum(start - wrapped + enter / 2, 0.0)
         past = np.maximum(wrapped + leave / 2 - stop, 0.0)
@@ -160,16 +176,22 @@ def _plain(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, 
 def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Array, result: Array) -> None:
     e = cut.elements
     share = np.where(chip > 0, share, 0.0)
-    area = chip * e.thickness
-    radial = share * (material.Krc * area + material.Kre * e.length)
-    tangential = share * (material.Ktc * area + material.Kte * e.length)
-    axial = share * (material.Kac * area + material.Kae * e.length)
+    area = chip * e.width
+    ktc, krc, kac, kte, kre, kae = _coefficients(material, e.bottom).T
+    radial = share * (krc * area + kre * e.length)
+    tangential = share * (ktc * area + kte * e.length)
+    axial = share * (kac * area + kae * e.length)
     sine, cosine = np.sin(phi), np.cos(phi)
-    x = -radial * sine - tangential * cosine
-    radius = e.radius[:, None]
-    for column, value in enumerate((x, -radial * cosine + tangential * sine, -axial, radius * tangential,
-                                    -cut.lever * x - radius * sine * axial)):
-        result[:, column] += value.sum(axis=(1, 2))
+    radius = e.radius + e.runout[:, None]
+    across = e.sin_kappa * radial + e.cos_kappa * axial
+    force = (-across * sine - tangential * cosine, -across * cosine + tangential * sine,
+             e.cos_kappa * radial - e.sin_kappa * axial)
+    x, y, z = radius * sine, radius * cosine, e.height
+    a, o = cut.axis, cut.origin
+    arm = (o[0] + a[1] * z - a[2] * y, o[1] + a[2] * x - a[0] * z, o[2] + a[0] * y - a[1] * x)
+    moment = sum(p * f for p, f in zip(arm, force, strict=True))
+    for column, value in enumerate((*force, radius * tangential, moment)):
+        result[:, column] += np.sum(value, axis=(1, 2))
 
 
 def cutting_velocity(op: Operation, conditions: Conditions, angle: Array, height: Array) -> Array:

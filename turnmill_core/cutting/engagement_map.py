@@ -1,0 +1,216 @@
+"""Numeric engagement: where any tool, on any path, moves into the material that is left.
+
+A circle of the tool's surface cuts where it moves outwards, f . n > 0 (`normal_feed`; the ends of that range are
+exact), and where the swept workpiece still holds material. The ends of an arc are found by bisection, so that
+they are as good as the workpiece and not as the probes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnmill_core.cutting._kernels import sweep
+from turnmill_core.cutting.cutter import cutter_elements, outer_radius
+from turnmill_core.cutting.engagement import Engagement, Removal
+from turnmill_core.cutting.feed import ToolMotion, normal_feed, tool_motion
+from turnmill_core.cutting.swept import SweptWorkpiece, fresh_workpiece, poses_at, poses_near, swept_by
+from turnmill_core.cutting.tool import Array, EdgeElements, read_only
+from turnmill_core.machine.axes import AxisState
+from turnmill_core.operation import Operation, Tool, require
+
+PROBE_STEP = math.radians(2)
+"""Angle between probes; an arc that is narrower may be missed."""
+
+_TOLERANCE = 1e-6  # rad, of an arc's ends
+_LEVELS = 60  # heights at which contact is sought
+
+
+@dataclass(frozen=True)
+class EngagementMap:
+    """Engagement of the tool at one instant.
+
+    motion: of the tool; elements: edges from the lowest to the highest contact, m of them, bottom edges
+    first; feed [m/s] (m, 3): A, B, C of `normal_feed`; arcs: height, start and exit angles (m, A), as many
+    arcs as any height has; removal: volume per time that the engaged surface takes, side and bottom apart.
+    """
+
+    motion: ToolMotion
+    elements: EdgeElements
+    feed: Array
+    arcs: Engagement
+    removal: Removal
+
+    @property
+    def in_cut(self) -> bool:
+        """Whether anything is cut."""
+        return self.removal.total > 0
+
+
+def engage(
+    op: Operation, workpiece: SweptWorkpiece, axes: AxisState, elements: int = 40, bottom: int = 12
+) -> tuple[SweptWorkpiece, EngagementMap]:
+    """Move the tool to `axes`; the workpiece it leaves behind and its engagement there.
+
+    Args:
+        op: the operation: tool and stock; its nominal cut plays no part.
+        workpiece: from `fresh_workpiece`, or from the call before.
+        axes: axis state with positions and velocities.
+        elements: elements around the tool.
+        bottom: elements of the bottom edge.
+
+    Raises:
+        ValueError: a tool speed against the cutting sense, material that meets the tool above its flutes, or
+            what `swept_by` refuses.
+    """
+    require(all(map(math.isfinite, axes.velocity)), "axis velocities", axes.velocity, "m/s, rad/s", "finite numbers")
+    workpiece = swept_by(op, workpiece, axes)
+    return workpiece, engagement_map(op, workpiece, axes, elements, bottom)
+
+
+def engagement_along(
+    op: Operation, states: Iterable[AxisState], workpiece: SweptWorkpiece | None = None, elements: int = 40,
+    bottom: int = 12,
+) -> Iterator[EngagementMap]:
+    """Engagement at each of the axis states `states`, the workpiece updated along the way.
+
+    workpiece: where the path begins; the untouched stock if not given. Between two states every axis moves
+    linearly. See `engage` for the rest.
+    """
+    workpiece = fresh_workpiece(op) if workpiece is None else workpiece
+    for axes in states:
+        workpiece, cut = engage(op, workpiece, axes, elements, bottom)
+        yield cut
+
+
+def engagement_map(
+    op: Operation, workpiece: SweptWorkpiece, axes: AxisState, elements: int = 40, bottom: int = 12
+) -> EngagementMap:
+    """Engagement of the tool at `axes` in a workpiece that it has swept up to there; see `engage`."""
+    motion = tool_motion(op, axes)
+    require(motion.tool_speed > -0.1, "tool spindle speed (axis s)", motion.tool_speed, "rad/s",
+            "a speed >= 0, clockwise seen from the spindle")
+    now = poses_at(op, np.asarray(axes.position))[0]
+    c = motion.c
+    to_workpiece = np.array([[math.cos(c), math.sin(c), 0.0], [-math.sin(c), math.cos(c), 0.0], [0.0, 0.0, 1.0]])
+    columns = np.ascontiguousarray(to_workpiece @ motion.rotation)
+    contact = _contact(op.tool, workpiece, now[:3], columns)
+    if contact is None:
+        return _empty(op.tool, motion)
+    low, top, beyond = contact
+    edges = cutter_elements(op.tool, top, elements, bottom if low == 0 else 0, low)
+    feed = normal_feed(motion, edges)
+    poses = _earlier(op.tool, workpiece, now, columns, edges)
+    start, stop = _arcs(workpiece, poses, now[:3], columns, edges.radius, edges.height, feed)
+    if beyond > top:
+        _check_shank(op.tool, workpiece, motion, now, columns, beyond)
+    arcs = Engagement(edges.height, read_only(start), read_only(stop))
+    return EngagementMap(motion, edges, read_only(feed), arcs, _removal(edges, feed, arcs))
+
+
+def _contact(tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array) -> tuple[float, float, float] | None:
+    """Lowest and highest contact of the flutes with the stock, and the highest of the whole tool; None: no contact."""
+    stock, axis = workpiece.stock, columns[:, 2]
+    reach = math.sqrt(workpiece.profile[sweep.WIDEST])
+    require(math.isfinite(reach), "flute length", tool.flute_length, "m", "a finite length of a tapered tool")
+    limit = math.inf
+    for k in range(3):
+        side = reach * math.sqrt(max(1 - axis[k] ** 2, 0.0))
+        if abs(axis[k]) > 1e-9:
+            bound = stock.box[2 * k + 1] + side if axis[k] > 0 else stock.box[2 * k] - side
+            limit = min(limit, (bound - tip[k]) / axis[k])
+    if limit < 0:
+        return None
+    require(math.isfinite(limit), "flute length", tool.flute_length, "m", "a finite length of a tool along the stock")
+    heights = np.linspace(0.0, max(limit, 1e-9), _LEVELS)
+    hits = _levels(tool, workpiece, tip, columns, heights)
+    if not hits.any():
+        return None
+    first, last = int(hits.argmax()), len(hits) - 1 - int(hits[::-1].argmax())
+    low = 0.0 if first == 0 else heights[first - 1]
+    high = heights[min(last + 1, len(heights) - 1)]
+    for _ in range(2):  # the neighbours, divided again
+        near = np.linspace(heights[last], high, 9)
+        hit = _levels(tool, workpiece, tip, columns, near)
+        high = float(near[min(len(near) - 1, len(near) - int(hit[::-1].argmax()))]) if hit.any() else high
+    top = min(high, tool.flute_length)
+    return (low, top, high) if low < top else None
+
+
+def _levels(tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array, heights: Array) -> np.ndarray:
+    """Which circles of the tool at `heights` (n,) touch the uncut stock, bool (n,)."""
+    stock = workpiece.stock
+    radii = outer_radius(tool, np.minimum(heights, tool.flute_length))
+    hits = np.zeros(len(heights))
+    sweep.touching(workpiece.profile, tip, columns, stock.numbers, stock.z, stock.radius, radii, heights, 90, hits)
+    return hits > 0
+
+
+def _earlier(tool: Tool, workpiece: SweptWorkpiece, now: Array, columns: Array, edges: EdgeElements) -> Array:
+    """Poses that may have swept what the edges meet, but for the last ones, less than a spacing away.
+
+    A convex tool leaves those behind; its own leading side was never in them.
+    """
+    newest = workpiece.poses
+    for block in workpiece.blocks[::-1]:
+        moved = (np.linalg.norm(block[:, :3] - now[:3], axis=1)
+                 + 2 * tool.diameter * np.linalg.norm(block[:, 3:6] - now[3:], axis=1))
+        away = np.flatnonzero(moved[::-1] >= workpiece.spacing)
+        newest -= int(away[0]) if away.size else len(block)
+        if away.size:
+            break
+    low, top = float(edges.height.min()), float(edges.height.max())
+    size = math.hypot((top - low) / 2, float(edges.radius.max()))
+    return poses_near(workpiece, now[:3] + columns[:, 2] * (low + top) / 2, size, newest)
+
+
+def _arcs(
+    workpiece: SweptWorkpiece, poses: Array, tip: Array, columns: Array, radius: Array, height: Array, feed: Array
+) -> tuple[Array, Array]:
+    """Start and exit angles (m, A) of the arcs, empty ones at the exit of the last before them."""
+    stock, room = workpiece.stock, 4
+    while True:
+        start, stop = np.empty((2, len(radius), room))
+        most = sweep.arcs(radius, height, feed, tip, columns, workpiece.profile, poses, stock.numbers, stock.z,
+                          stock.radius, PROBE_STEP, _TOLERANCE, start, stop)
+        if most <= room:
+            break
+        room = most
+    start, stop = start[:, :max(most, 2)], stop[:, :max(most, 2)]
+    stop = np.where(np.isnan(stop), -np.inf, stop)
+    end = np.maximum.accumulate(stop, axis=1)
+    end = np.where(np.isneginf(end), 0.0, end)
+    return np.where(np.isnan(start), end, start), end
+
+
+def _removal(edges: EdgeElements, feed: Array, arcs: Engagement) -> Removal:
+    s, e = arcs.start, arcs.exit
+    flux = (feed[:, :1] * (np.cos(s) - np.cos(e)) + feed[:, 1:2] * (np.sin(e) - np.sin(s)) + feed[:, 2:] * (e - s))
+    volume = edges.radius * edges.width * flux.sum(axis=1)
+    side, bottom = float(volume[~edges.bottom].sum()), float(volume[edges.bottom].sum())
+    return Removal(side, bottom, side + bottom)
+
+
+def _check_shank(
+    tool: Tool, workpiece: SweptWorkpiece, motion: ToolMotion, now: Array, columns: Array, beyond: float
+) -> None:
+    """Raise ValueError where material meets the tool above its flutes."""
+    height = np.linspace(tool.flute_length, beyond, 9)[1:]
+    radius = np.full(8, float(outer_radius(tool, np.array([tool.flute_length]))[0]))
+    feed = np.stack([motion.velocity[0] + height * motion.spin[1], motion.velocity[1] - height * motion.spin[0],
+                     np.zeros(8)], axis=1)
+    poses = poses_near(workpiece, now[:3] + columns[:, 2] * beyond, beyond - tool.flute_length + radius[0])
+    start, stop = _arcs(workpiece, poses, now[:3], columns, radius, height, feed)
+    require(not bool((stop > start).any()), "depth along the tool axis", beyond, "m",
+            f"at most the flute length {tool.flute_length} m: material meets the tool above its flutes")
+
+
+def _empty(tool: Tool, motion: ToolMotion) -> EngagementMap:
+    """Map of a tool that touches nothing: one element, no arc."""
+    edges = cutter_elements(tool, min(tool.radius, tool.flute_length) / 2, 1, 0)
+    nothing = read_only(np.zeros((len(edges.height), 2)))
+    return EngagementMap(motion, edges, read_only(normal_feed(motion, edges)),
+                         Engagement(edges.height, nothing, nothing), Removal(0.0, 0.0, 0.0))
