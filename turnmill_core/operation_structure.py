@@ -275,7 +275,7 @@ class Beam:
     supports: tuple[Support, ...] = ()
     bore: float = 0.0
     shear: ShearCoefficient = "cowper"
-    modes: int = 3
+    modes: int = 2
 
     def __post_init__(self) -> None:
         not_negative("beam bore", self.bore, "m")

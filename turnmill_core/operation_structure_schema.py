@@ -194,7 +194,7 @@ class BeamSection(Section):
     supports: tuple[SupportSection, ...] = Field((), description="tailstock, steady rests")
     bore: Length = Field(0.0, description="diameter of a hole along the axis; 0 mm if left out")
     shear: Literal["cowper", "hutchinson"] = Field("cowper", description="shear coefficient of the beam")
-    modes: int = Field(3, strict=True, ge=1, le=20, description="modes kept in each plane")
+    modes: int = Field(2, strict=True, ge=1, le=20, description="modes kept in each plane")
 
     def value(self) -> Beam:
         """The beam."""

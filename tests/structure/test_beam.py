@@ -74,7 +74,7 @@ def test_cantilever(length: float, diameter: float) -> None:
 
 @pytest.mark.parametrize(("length", "diameter"), SIZES)
 def test_pinned_on_both_ends(length: float, diameter: float) -> None:
-    """EI b^4 - (rho A + (rho I + EI rho A / kGA) b^2) w^2 + rho A rho I / kGA w^4 = 0 with b = n pi / L, and pure shear."""
+    """EI b^4 - (rho A + (rho I + EI rho A / kGA) b^2) w^2 + rho A rho I / kGA w^4 = 0, b = n pi / L; or shear alone."""
     EI, kGA, rhoA, rhoI = constants(diameter)
     pins = tuple(Support(s, 1e9 * EI / length**3) for s in (0.0, length))
     found = normal_modes(with_supports(free_bar(cylinder(length, diameter), STEEL), pins), 3).frequency

@@ -40,6 +40,9 @@ def checked_phases(model: ModalModel) -> ModalModel:
 
 
 def _check_power(model: ModalModel) -> None:
+    own = np.all(model.shapes == model.force_shapes, axis=0)  # not the oscillators of a symmetric cross receptance
+    model = ModalModel(model.frequency[own], model.damping[own], model.shapes[:, own], model.force_shapes[:, own],
+                       None if model.phase is None else model.phase[own])
     frequency = _around(model)
     phi = frf(model, frequency)
     taken = np.linalg.eigvalsh((phi.conj().swapaxes(1, 2) - phi) / 2j)[:, 0]

@@ -103,7 +103,8 @@ def _seat(bar: PlaneModel, rows: ArrayLike, frequency: Floats) -> tuple[Complexe
     inside = dynamic[:, :-2, :-2]
     across = np.linalg.solve(inside, dynamic[:, :-2, -2:])
     A = inner @ np.linalg.solve(inside, np.broadcast_to(inner.T.astype(complex), (frequency.size, *inner.T.shape)))
-    return np.asarray(A), np.asarray(seat - inner @ across), dynamic[:, -2:, -2:] - dynamic[:, -2:, :-2] @ across
+    stiffness = np.asarray(dynamic[:, -2:, -2:] - dynamic[:, -2:, :-2] @ across, dtype=np.complex128)
+    return np.asarray(A, dtype=np.complex128), np.asarray(seat - inner @ across, dtype=np.complex128), stiffness
 
 
 def seated_receptances(bar: PlaneModel, rows: ArrayLike, base: Complexes, frequency: ArrayLike) -> Complexes:

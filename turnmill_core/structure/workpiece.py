@@ -40,7 +40,7 @@ def bar_structure(profile: BarProfile, beam: Beam, contact: float) -> Structure:
         for k, (frequency, damping) in enumerate(zip(found.frequency, found.damping, strict=True)):
             require(damping > 0, "workpiece damping", float(damping), f"at {frequency:.0f} Hz",
                     "a loss factor of the material, or damping of chuck or support")
-            largest = float(np.abs(lateral[:, k]).max())
+            largest = float(lateral[np.argmax(np.abs(lateral[:, k])), k])
             share = float(at_contact[k]) / largest
             shape = (share, 0.0, 0.0) if axis == 0 else (0.0, share, 0.0)
             if abs(share) > 1e-9:
