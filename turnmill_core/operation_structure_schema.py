@@ -189,8 +189,8 @@ class BeamSection(Section):
     """A bar whose modes follow from its shape, its chuck and what has been cut away."""
 
     material: BeamMaterialSection
-    chuck_x: ChuckSection = Field(ChuckSection(), description="chuck in the plane of x; clamped if left out")
-    chuck_y: ChuckSection = Field(ChuckSection(), description="chuck in the plane of y; clamped if left out")
+    chuck_x: ChuckSection | None = Field(None, description="chuck in the plane of x; clamped if left out")
+    chuck_y: ChuckSection | None = Field(None, description="chuck in the plane of y; clamped if left out")
     supports: tuple[SupportSection, ...] = Field((), description="tailstock, steady rests")
     bore: Length = Field(0.0, description="diameter of a hole along the axis; 0 mm if left out")
     shear: Literal["cowper", "hutchinson"] = Field("cowper", description="shear coefficient of the beam")
@@ -198,7 +198,8 @@ class BeamSection(Section):
 
     def value(self) -> Beam:
         """The beam."""
-        return Beam(BeamMaterial(**self.material.model_dump()), self.chuck_x.value(), self.chuck_y.value(),
+        x, y = (Chuck() if chuck is None else chuck.value() for chuck in (self.chuck_x, self.chuck_y))
+        return Beam(BeamMaterial(**self.material.model_dump()), x, y,
                     tuple(Support(s.position, s.stiffness, s.damping) for s in self.supports), self.bore, self.shear,
                     self.modes)
 
