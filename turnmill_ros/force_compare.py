@@ -73,7 +73,7 @@ def compare(
             if held is None:
                 raise InputError("no operation before the first axis state", file=path, hint="give one: --operation")
             try:
-                found = comparison.add_loads(follower.loads(held, axes), axes.velocity[5], axes.stamp_ns)
+                found = comparison.add_loads(follower.loads(held, axes).loads, axes.velocity[5], axes.stamp_ns)
             except ValueError as error:
                 refused, reason = refused + 1, reason or str(error)
         for source, estimate in found:

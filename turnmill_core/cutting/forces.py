@@ -10,6 +10,7 @@ along themselves.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +28,7 @@ from turnmill_core.cutting.chip import (
     static_chip,
 )
 from turnmill_core.cutting.feed import feed_velocity
-from turnmill_core.cutting.tool import Array, read_only
+from turnmill_core.cutting.tool import Array, EdgeElements, read_only
 from turnmill_core.operation import Conditions, Material, Operation, require
 
 _POINT = 1e-6  # window [rad] that stands for a point where the edge has no helix
@@ -154,14 +155,23 @@ def _fast(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, A
 
 def _plain(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, Array], result: Array) -> float:
     """The kernels' numpy twin: every angle, tooth, height and arc at once."""
-    e = cut.elements
-    count = len(result)
-    phi = (np.arange(count) * (2 * math.pi / count))[:, None, None] + e.offset[None, :, None] - e.lag[None]
+    largest = 0.0
+    for thickness, phi, share in _pieces(cut, chip, windows, len(result)):
+        for column, value in enumerate(_local_loads(cut, material, thickness, phi, share)):
+            result[:, column] += np.sum(value, axis=(1, 2))
+        largest = float(thickness.max())
+    return largest if chip == "exact" else largest_static_chip(cut)
+
+
+def _pieces(
+    cut: Cut, chip: ChipModel, windows: tuple[Array, Array], angles: int
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Chip [m], tooth angle [rad] and share in the cut of every piece of edge (n, N, m), arc by arc."""
+    e, arcs = cut.elements, cut.engagement
+    phi = (np.arange(angles) * (2 * math.pi / angles))[:, None, None] + e.offset[None, :, None] - e.lag[None]
     if chip == "exact":
-        thickness = exact_chip(cut, phi)
-        _sum_forces(cut, material, thickness, phi, np.ones_like(phi), result)
-        return float(thickness.max())
-    arcs = cut.engagement
+        yield exact_chip(cut, phi), phi, np.ones_like(phi)
+        return
     for start, stop, enter, leave in zip(arcs.start.T, arcs.exit.T, *(np.moveaxis(w, 2, 0) for w in windows),
                                          strict=True):
         wrapped = start - enter / 2 + (phi - start + enter / 2) % (2 * math.pi)
@@ -169,11 +179,13 @@ def _plain(cut: Cut, material: Material, chip: ChipModel, windows: tuple[Array, 
         past = np.maximum(wrapped + leave / 2 - stop, 0.0)
         share = np.maximum(1 - outside / enter, 0.0) * np.maximum(1 - past / leave, 0.0) * (stop > start)
         middle = wrapped + (outside - past) / 2
-        _sum_forces(cut, material, static_chip(cut, middle), middle, share, result)
-    return largest_static_chip(cut)
+        yield static_chip(cut, middle), middle, share
 
 
-def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Array, result: Array) -> None:
+def _local_loads(
+    cut: Cut, material: Material, chip: Array, phi: Array, share: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Forces x, y, z [N], tool torque and workpiece torque [N m] of every piece of edge (n, N, m)."""
     e = cut.elements
     share = np.where(chip > 0, share, 0.0)
     area = chip * e.width
@@ -184,14 +196,47 @@ def _sum_forces(cut: Cut, material: Material, chip: Array, phi: Array, share: Ar
     sine, cosine = np.sin(phi), np.cos(phi)
     radius = e.radius + e.runout[:, None]
     across = e.sin_kappa * radial + e.cos_kappa * axial
-    force = (-across * sine - tangential * cosine, -across * cosine + tangential * sine,
-             e.cos_kappa * radial - e.sin_kappa * axial)
+    fx, fy = -across * sine - tangential * cosine, -across * cosine + tangential * sine
+    fz = e.cos_kappa * radial - e.sin_kappa * axial
     x, y, z = radius * sine, radius * cosine, e.height
     a, o = cut.axis, cut.origin
     arm = (o[0] + a[1] * z - a[2] * y, o[1] + a[2] * x - a[0] * z, o[2] + a[0] * y - a[1] * x)
-    moment = sum(p * f for p, f in zip(arm, force, strict=True))
-    for column, value in enumerate((*force, radius * tangential, moment)):
-        result[:, column] += np.sum(value, axis=(1, 2))
+    return fx, fy, fz, radius * tangential, arm[0] * fx + arm[1] * fy + arm[2] * fz
+
+
+@dataclass(frozen=True)
+class EdgeLoads:
+    """Loads along the edges over one revolution of the tool spindle; n angles, N teeth, m elements.
+
+    angle [rad] (n,); elements: the edges; chip [m] (n, N, m), uncut chip thickness, 0 out of the cut; force [N]
+    (n, N, m, 3), on the tool in the tool frame; tool_torque [N m] (n, N, m).
+    """
+
+    angle: Array
+    elements: EdgeElements
+    chip: Array
+    force: Array
+    tool_torque: Array
+
+
+def edge_loads(material: Material, cut: Cut, angles: int = 360, chip: ChipModel = "static") -> EdgeLoads:
+    """What `revolve` adds up, piece by piece along the edges.
+
+    Args:
+        material: coefficients.
+        cut: from `prepare_cut`, or a part of an engagement map.
+        angles: number of angles n.
+        chip: `static` or `exact`.
+    """
+    shape = (angles, *cut.elements.lag.shape)
+    chips, force, torque = np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape)
+    for thickness, phi, share in _pieces(cut, chip, _windows(cut, 0.0), angles):
+        loads = _local_loads(cut, material, thickness, phi, share)
+        force += np.stack(loads[:3], axis=-1)
+        torque += loads[3]
+        chips = np.maximum(chips, np.where(share > 0, thickness, 0.0))
+    angle = np.arange(angles) * (2 * math.pi / angles)
+    return EdgeLoads(read_only(angle), cut.elements, read_only(chips), read_only(force), read_only(torque))
 
 
 def cutting_velocity(op: Operation, conditions: Conditions, angle: Array, height: Array) -> Array:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 
+from turnmill_core.cutting.along_path import Method
 from turnmill_core.cutting.loads import CuttingLoads
 from turnmill_core.cutting.scale import ScaleEstimate
-from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool, nominal_axes
+from turnmill_core.machine.conditions import nominal_axes
 from turnmill_core.operation import Operation
 from turnmill_ros import topics
 from turnmill_ros.conversions import (
@@ -21,6 +22,7 @@ from turnmill_ros.conversions import (
     scale_to_message,
     wrench_to_message,
 )
+from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.loads_follower import LoadsFollower
 from turnmill_ros.measured import Comparison, Source
@@ -40,8 +42,12 @@ class ForcePredictor(LifecycleNode):
         super().__init__("force_predictor", **kwargs)
         self._rate = declare(
             self, "rate", topics.CUTTING_LOADS.rate, "Hz, predictions per second of axis time", low=1.0, high=250.0)
+        self._method = declare(
+            self, "engagement", "auto", "auto (closed form where there is one), closed, swept (workpiece in process)")
+        if self._method not in get_args(Method):
+            raise InputError("engagement", value=self._method, expected=" or ".join(get_args(Method)))
         self._match, lossless = support.declare_common(self)
-        self._operations, self._follower, self._comparison = OperationTrack(), LoadsFollower(self._rate), Comparison()
+        self._operations, self._follower, self._comparison = OperationTrack(), self._fresh(), Comparison()
         self._received, self._sent, self._refused = 0, 0, ""
         self._out = {topic: support.publisher(self, topic, keep_all=lossless) for topic in (
             topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, topics.FORCE_SCALE, *LOAD_PLOTS)}
@@ -51,6 +57,9 @@ class ForcePredictor(LifecycleNode):
         support.subscription(self, topics.SENSOR_BLOCKS, self.on_block)
         support.subscription(self, topics.WRENCH_MEASURED, self.on_wrench)
 
+    def _fresh(self) -> LoadsFollower:
+        return LoadsFollower(self._rate, self._method)
+
     def on_operation(self, message: Any) -> None:
         """Predict for another operation from its stamp on."""
         support.accept_operation(self._operations.add, message)
@@ -59,13 +68,13 @@ class ForcePredictor(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> None:
         """Compile the force model on the operation that is published."""
         operation = support.wait_for_operation(self, self._operations)
-        self._follower.loads(operation, nominal_axes(operation))
+        self._fresh().loads(operation, nominal_axes(operation))
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:
         """Wait for axis states."""
         support.wait_until_matched(self, self._match)
-        self._follower, self._comparison = LoadsFollower(self._rate), Comparison()
+        self._follower, self._comparison = self._fresh(), Comparison()
         self.diagnostics.enter(support.ACTIVE)
 
     @support.transition
@@ -84,16 +93,15 @@ class ForcePredictor(LifecycleNode):
             return
         axes = axes_from_message(message)
         try:
-            loads = self._follower.loads(operation, axes)
-            rotation = machine_from_tool(operation, conditions_from_axes(operation, axes))
+            found = self._follower.loads(operation, axes)
             self._refused = ""
         except ValueError as error:
             self._refused = f"no prediction: {error}"
             return
-        for topic, out in messages(loads, rotation, stamp):
+        for topic, out in messages(found.loads, found.rotation, stamp):
             support.send(self._out[topic], out)
         self._sent += 1
-        self._publish(self._comparison.add_loads(loads, axes.velocity[5], stamp), operation)
+        self._publish(self._comparison.add_loads(found.loads, axes.velocity[5], stamp), operation)
 
     def on_block(self, message: Any) -> None:
         """Take measured force, torque and power."""
