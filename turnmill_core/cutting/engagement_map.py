@@ -93,7 +93,7 @@ def engagement_map(
     motion = tool_motion(op, axes)
     require(motion.tool_speed > -0.1, "tool spindle speed (axis s)", motion.tool_speed, "rad/s",
             "a speed >= 0, clockwise seen from the spindle")
-    now = poses_at(op, np.asarray(axes.position))[0]
+    now = poses_at(op, np.asarray(axes.position))[:, 0]
     c = motion.c
     to_workpiece = np.array([[math.cos(c), math.sin(c), 0.0], [-math.sin(c), math.cos(c), 0.0], [0.0, 0.0, 1.0]])
     columns = np.ascontiguousarray(to_workpiece @ motion.rotation)
@@ -145,7 +145,7 @@ def _levels(tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array, h
     stock = workpiece.stock
     radii = outer_radius(tool, np.minimum(heights, tool.flute_length))
     hits = np.zeros(len(heights))
-    sweep.touching(workpiece.profile, tip, columns, stock.numbers, stock.z, stock.radius, radii, heights, 90, hits)
+    sweep.touching(tip, columns, stock.numbers, stock.z, stock.radius, radii, heights, 90, hits)
     return hits > 0
 
 
@@ -156,10 +156,10 @@ def _earlier(tool: Tool, workpiece: SweptWorkpiece, now: Array, columns: Array, 
     """
     newest = workpiece.poses
     for block in workpiece.blocks[::-1]:
-        moved = (np.linalg.norm(block[:, :3] - now[:3], axis=1)
-                 + 2 * tool.diameter * np.linalg.norm(block[:, 3:6] - now[3:], axis=1))
+        moved = (np.linalg.norm(block[:3] - now[:3, None], axis=0)
+                 + 2 * tool.diameter * np.linalg.norm(block[3:6] - now[3:, None], axis=0))
         away = np.flatnonzero(moved[::-1] >= workpiece.spacing)
-        newest -= int(away[0]) if away.size else len(block)
+        newest -= int(away[0]) if away.size else block.shape[1]
         if away.size:
             break
     low, top = float(edges.height.min()), float(edges.height.max())

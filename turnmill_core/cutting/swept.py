@@ -52,7 +52,7 @@ class Stock:
 class SweptWorkpiece:
     """Stock and the poses that the tool has passed; a value, renewed by `swept_by`.
 
-    profile (13,): the cutter's shape for the kernels; spacing [m]: distance between poses; blocks: poses (n, 12), tip,
+    profile (13,): the cutter's shape for the kernels; spacing [m]: distance between poses; blocks: poses (12, n), tip,
     axis and their change to the next, in order; last: axis state up to which the poses go (None: no motion yet).
     """
 
@@ -65,7 +65,7 @@ class SweptWorkpiece:
     @property
     def poses(self) -> int:
         """Number of poses that are held."""
-        return sum(map(len, self.blocks))
+        return sum(block.shape[1] for block in self.blocks)
 
 
 def profile_of(tool: Tool, spacing: float) -> Array:
@@ -74,13 +74,14 @@ def profile_of(tool: Tool, spacing: float) -> Array:
     `spacing` [m]: distance of the poses, which makes the cusp between them.
     """
     shape, line = tool.shape, outline(tool.diameter, tool.flute_length, tool.shape)
+    cusp = spacing**2 / (8 * tool.radius)
     widest = max(line.top[0], line.corner_end[0], line.tip_end[0])
     if line.centre[1] < line.corner_end[1]:  # the arc bulges below its end
         widest = max(widest, line.centre[0] + shape.corner_radius)
     return read_only((
         math.tan(shape.tip_angle), line.tip_end[1], *line.centre, shape.corner_radius**2, line.corner_end[1],
         line.flank_foot, math.tan(shape.taper_angle), line.top[1], line.wiper_start, math.tan(shape.bottom_clearance),
-        (widest + spacing) ** 2, spacing**2 / (8 * tool.radius)))
+        (widest + cusp) ** 2, cusp))
 
 
 def stock_of(op: Operation) -> Stock:
@@ -112,14 +113,14 @@ def fresh_workpiece(op: Operation, spacing: float | None = None, stock: Stock | 
 
 
 def poses_at(op: Operation, position: Array) -> Array:
-    """Tool tip and axis (n, 6) in the workpiece frame at axis positions (n, 6) x, y, z, b, c, s."""
+    """Tool tip and axis (6, n) in the workpiece frame at axis positions (n, 6) x, y, z, b, c, s."""
     p = np.atleast_2d(np.asarray(position, dtype=np.float64))
     tip, b, c = p[:, :3] - np.asarray(op.workpiece.datum), p[:, 3], p[:, 4]
     cosine, sine = np.cos(c), np.sin(c)
     across, along = np.sin(b), np.cos(b)
     return np.stack([
         cosine * tip[:, 0] + sine * tip[:, 1], cosine * tip[:, 1] - sine * tip[:, 0], tip[:, 2],
-        cosine * across, -sine * across, along], axis=1)
+        cosine * across, -sine * across, along])
 
 
 def swept_by(op: Operation, workpiece: SweptWorkpiece, axes: AxisState) -> SweptWorkpiece:
@@ -147,51 +148,54 @@ def swept_by(op: Operation, workpiece: SweptWorkpiece, axes: AxisState) -> Swept
     require(count + workpiece.poses <= MOST_POSES, "number of tool poses", count + workpiece.poses, "",
             f"at most {MOST_POSES}: a shorter path, or a wider spacing")
     along = poses_at(op, start + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - start))
-    poses = np.concatenate([along[:-1], np.diff(along, axis=0)], axis=1)
-    return replace(workpiece, blocks=_appended(workpiece.blocks, poses[_touching(workpiece, poses)]), last=axes)
+    poses = np.concatenate([along[:, :-1], np.diff(along, axis=1)])
+    return replace(workpiece, blocks=_appended(workpiece.blocks, poses[:, _touching(workpiece, poses)]), last=axes)
 
 
 def _appended(blocks: tuple[Array, ...], poses: Array) -> tuple[Array, ...]:
     """Blocks with `poses` behind them; the last block is filled up first."""
-    if len(poses) == 0:
+    count = poses.shape[1]
+    if count == 0:
         return blocks
-    if blocks and len(blocks[-1]) + len(poses) <= _BLOCK:
-        return (*blocks[:-1], read_only(np.concatenate([blocks[-1], poses])))
-    return (*blocks, *(read_only(poses[k:k + _BLOCK]) for k in range(0, len(poses), _BLOCK)))
+    if blocks and blocks[-1].shape[1] + count <= _BLOCK:
+        return (*blocks[:-1], read_only(np.concatenate([blocks[-1], poses], axis=1)))
+    return (*blocks, *(read_only(poses[:, k:k + _BLOCK]) for k in range(0, count, _BLOCK)))
 
 
 def _touching(workpiece: SweptWorkpiece, poses: Array) -> np.ndarray:
     """Poses (n,) of which the lowest or the outermost part may be in the stock."""
-    stock, tip, axis = workpiece.stock, poses[:, :3], poses[:, 3:6]
+    stock, tip, axis = workpiece.stock, poses[:3], poses[3:6]
     reach = math.sqrt(workpiece.profile[sweep.WIDEST])
-    keep = np.ones(len(poses), dtype=bool)
+    keep = np.ones(poses.shape[1], dtype=bool)
     if not math.isfinite(reach):
         return keep
     for k in range(3):  # the tool is a ray with a radius; it leaves the box where it points away from it
-        side = reach * np.sqrt(np.maximum(1 - axis[:, k] ** 2, 0.0))
-        keep &= (tip[:, k] - side <= stock.box[2 * k + 1]) | (axis[:, k] < 0)
-        keep &= (tip[:, k] + side >= stock.box[2 * k]) | (axis[:, k] > 0)
+        side = reach * np.sqrt(np.maximum(1 - axis[k] ** 2, 0.0))
+        keep &= (tip[k] - side <= stock.box[2 * k + 1]) | (axis[k] < 0)
+        keep &= (tip[k] + side >= stock.box[2 * k]) | (axis[k] > 0)
     if stock.bar:
-        away = np.hypot(tip[:, 0], tip[:, 1])
-        outward = (tip[:, 0] * axis[:, 0] + tip[:, 1] * axis[:, 1]) / np.maximum(away, 1e-12)
+        away = np.hypot(tip[0], tip[1])
+        outward = (tip[0] * axis[0] + tip[1] * axis[1]) / np.maximum(away, 1e-12)
         side = reach * np.sqrt(np.maximum(1 - outward**2, 0.0))
         keep &= (away - side <= stock.radius.max()) | (outward < 0)
     return keep
 
 
 def poses_near(workpiece: SweptWorkpiece, centre: Array, size: float, newest: int | None = None) -> Array:
-    """Poses (K, 12), newest first, whose tool may reach into the ball of radius `size` [m] around `centre` (3,).
+    """Poses (12, K), newest first, whose tool may reach into the ball of radius `size` [m] around `centre` (3,).
 
     newest: so many poses only, counted from the first; all of them if not given.
     """
     left = workpiece.poses if newest is None else newest
     found = []
     for block in workpiece.blocks:
-        part = block[:max(left, 0)]
-        left -= len(part)
-        chosen = np.empty_like(part)
-        found.append(chosen[:sweep.near(part, centre, size, workpiece.profile, chosen)][::-1])
-    return np.ascontiguousarray(np.concatenate(found[::-1])) if found else np.empty((0, 12))
+        part = block[:, :max(left, 0)]
+        left -= part.shape[1]
+        chosen = np.empty(part.shape[1], dtype=np.int64)
+        count = sweep.near(part, centre, size, workpiece.profile, chosen)
+        if count:
+            found.append(part[:, chosen[:count][::-1]])
+    return np.ascontiguousarray(np.concatenate(found[::-1], axis=1)) if found else np.empty((12, 0))
 
 
 def material_at(workpiece: SweptWorkpiece, points: Sequence[Sequence[float]] | Array) -> np.ndarray:

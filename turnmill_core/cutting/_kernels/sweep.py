@@ -1,8 +1,8 @@
 """What an axisymmetric cutter has swept, point by point, and the arcs in which its surface meets material.
 
-Positions in metres in the workpiece frame, which turns with the workpiece. A pose is the tool tip, the tool
-axis, and what both change by to the next pose (12,); a profile the numbers of `swept.profile_of`; a stock those
-of `swept.stock_of`.
+Positions in metres in the workpiece frame, which turns with the workpiece. A pose is the tool tip, the tool axis, and
+what both change by to the next pose, a column (12, K); a profile the numbers of `swept.profile_of`; a stock those of
+`swept.Stock`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Where = tuple[Array, Array, Array, Array, Array]  # tool tip, tool axes, stock with its knots z and radius
 
 
 TIGHT = 1e-9
 """Distance [m] within which a point at the surface of an earlier pose counts as removed."""
+
+BLOCK = 32
+"""Poses that are looked at together."""
 
 # places in a profile; slopes are tangents, WIDEST is squared, CUSP is left between two poses
 (TIP_SLOPE, TIP_END, CENTRE_RADIUS, CENTRE_HEIGHT, CORNER_SQUARE, CORNER_END, FOOT, TAPER_SLOPE, TOP, WIPER, DISH_SLOPE,
@@ -72,33 +76,43 @@ def in_stock(stock: Array, z_knots: Array, radius_knots: Array, x: float, y: flo
 
 @njit(cache=True)
 def covered_by(profile: Array, poses: Array, x: float, y: float, z: float, hint: int) -> int:
-    """Index of a pose whose tool holds the point, `hint` tried first; -1 where there is none."""
-    n = len(poses)
-    for i in range(-1, n):
-        k = i
-        if i < 0:
-            if hint < 0 or hint >= n:
-                continue
-            k = hint
-        dx, dy, dz = x - poses[k, 0], y - poses[k, 1], z - poses[k, 2]
-        h = dx * poses[k, 3] + dy * poses[k, 4] + dz * poses[k, 5]
-        if h < -profile[CUSP]:
-            continue
-        square = dx * dx + dy * dy + dz * dz - h * h
-        if within(profile, square, h, profile[CUSP]) and (
-                within(profile, square, h, TIGHT) or _between(profile, poses[k], x, y, z)):
-            return k
+    """Index of a pose (columns of poses) whose tool holds the point, `hint` tried first; -1 where there is none."""
+    if 0 <= hint < poses.shape[1] and _holds(profile, poses, hint, x, y, z):
+        return hint
+    tip_x, tip_y, tip_z, axis_x, axis_y, axis_z = poses[0], poses[1], poses[2], poses[3], poses[4], poses[5]
+    lowest, highest, widest = -profile[CUSP], profile[TOP], profile[WIDEST]
+    n = poses.shape[1]
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        candidates = 0
+        for k in range(first, last):  # without branches, so that it is vectorized
+            dx, dy, dz = x - tip_x[k], y - tip_y[k], z - tip_z[k]
+            h = dx * axis_x[k] + dy * axis_y[k] + dz * axis_z[k]
+            square = dx * dx + dy * dy + dz * dz - h * h
+            candidates += (square < widest) & (h > lowest) & (h <= highest)
+        if candidates > 0:
+            for k in range(first, last):
+                if _holds(profile, poses, k, x, y, z):
+                    return k
     return -1
 
 
 @njit(cache=True)
-def _between(profile: Array, pose: Array, x: float, y: float, z: float) -> bool:
-    """Whether the tool holds the point somewhere within half a step of a pose."""
+def _holds(profile: Array, poses: Array, k: int, x: float, y: float, z: float) -> bool:
+    """Whether the tool holds the point at pose k or, where it nearly does, within half a step of it."""
+    dx, dy, dz = x - poses[0, k], y - poses[1, k], z - poses[2, k]
+    h = dx * poses[3, k] + dy * poses[4, k] + dz * poses[5, k]
+    square = dx * dx + dy * dy + dz * dz - h * h
+    if not within(profile, square, h, profile[CUSP]):
+        return False
+    if within(profile, square, h, TIGHT):
+        return True
     for i in range(1, 5):
         for t in (i / 8, -i / 8):
-            dx, dy, dz = x - pose[0] - t * pose[6], y - pose[1] - t * pose[7], z - pose[2] - t * pose[8]
-            h = dx * (pose[3] + t * pose[9]) + dy * (pose[4] + t * pose[10]) + dz * (pose[5] + t * pose[11])
-            if within(profile, dx * dx + dy * dy + dz * dz - h * h, h, TIGHT):
+            sx, sy, sz = dx - t * poses[6, k], dy - t * poses[7, k], dz - t * poses[8, k]
+            h = (sx * (poses[3, k] + t * poses[9, k]) + sy * (poses[4, k] + t * poses[10, k])
+                 + sz * (poses[5, k] + t * poses[11, k]))
+            if within(profile, sx * sx + sy * sy + sz * sz - h * h, h, TIGHT):
                 return True
     return False
 
@@ -121,6 +135,88 @@ def material(
 
 
 @njit(cache=True)
+def near(poses: Array, centre: Array, size: float, profile: Array, chosen: NDArray[np.int64]) -> int:
+    """Put the places of poses whose tool may reach into the ball `size` around `centre` in `chosen`; their number."""
+    count = 0
+    for k in range(poses.shape[1]):
+        dx, dy, dz = centre[0] - poses[0, k], centre[1] - poses[1, k], centre[2] - poses[2, k]
+        h = dx * poses[3, k] + dy * poses[4, k] + dz * poses[5, k]
+        if h < -size or h > profile[TOP] + size:
+            continue
+        lateral = math.sqrt(max(dx * dx + dy * dy + dz * dz - h * h, 0.0))
+        if lateral < size + math.sqrt(profile[WIDEST]):
+            chosen[count] = k
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _leading(feed: Array) -> tuple[float, float]:
+    """Angles between which f . n > 0; equal where there are none."""
+    size = math.hypot(feed[0], feed[1])
+    if feed[2] <= -size:
+        return 0.0, 0.0
+    middle = math.atan2(feed[0], feed[1])
+    half = math.pi if feed[2] >= size else math.acos(-feed[2] / size)
+    return middle - half, middle + half
+
+
+@njit(cache=True)
+def _place(radius: float, height: float, phi: float, where: Where) -> tuple[float, float, float]:
+    """Place of a point of the tool's surface in the workpiece frame."""
+    origin, axes = where[0], where[1]
+    x, y = radius * math.sin(phi), radius * math.cos(phi)
+    return (origin[0] + axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * height,
+            origin[1] + axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * height,
+            origin[2] + axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * height)
+
+
+@njit(cache=True)
+def _probe(
+    radius: float, height: float, phi: float, where: Where, profile: Array, poses: Array, ball: Array, inner: Array,
+    hint: int,
+) -> tuple[bool, int]:
+    """Whether there is material at the angle phi of a circle on the tool, and the pose that took it otherwise."""
+    x, y, z = _place(radius, height, phi, where)
+    if not in_stock(where[2], where[3], where[4], x, y, z):
+        return False, hint
+    if ball[3] > 0 and (x - ball[0]) ** 2 + (y - ball[1]) ** 2 + (z - ball[2]) ** 2 < ball[3] ** 2:
+        return covered_by(profile, inner, x, y, z, -1) < 0, hint
+    found = covered_by(profile, poses, x, y, z, hint)
+    return found < 0, found if found >= 0 else hint
+
+
+@njit(cache=True)
+def _core(
+    radius: Array, height: Array, feed: Array, where: Where, profile: Array, poses: Array, step: float
+) -> tuple[Array, Array]:
+    """A ball (centre, size) that holds most of the material met, and the poses that reach into it.
+
+    Found on some of the circles; a point inside it needs only those poses.
+    """
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    hint, none, nowhere = -1, np.empty((12, 0)), np.array([0.0, 0.0, 0.0, -1.0])
+    if poses.shape[1] < 2 * BLOCK:
+        return nowhere, none
+    for k in range(0, radius.size, 6):
+        first, last = _leading(feed[k])
+        for i in range(math.ceil((last - first) / step)):
+            phi = first + (i + 0.5) * step
+            now, hint = _probe(radius[k], height[k], phi, where, profile, poses, nowhere, none, hint)
+            if now:
+                place = _place(radius[k], height[k], phi, where)
+                for axis in range(3):
+                    low[axis] = min(low[axis], place[axis])
+                    high[axis] = max(high[axis], place[axis])
+    ball = nowhere
+    if low[0] <= high[0]:
+        ball[:3] = (low + high) / 2
+        ball[3] = 0.55 * math.sqrt(np.sum((high - low) ** 2)) + step * radius.max()
+    chosen = np.empty(poses.shape[1], dtype=np.int64)
+    return ball, poses[:, chosen[:near(poses, ball[:3], ball[3], profile, chosen)]]
+
+
+@njit(cache=True)
 def arcs(
     radius: Array, height: Array, feed: Array, origin: Array, axes: Array, profile: Array, poses: Array, stock: Array,
     z_knots: Array, radius_knots: Array, step: float, tolerance: float, start: Array, stop: Array,
@@ -133,16 +229,15 @@ def arcs(
     more than A.
     """
     most = 0
+    where = (origin, axes, stock, z_knots, radius_knots)
+    ball, inner = _core(radius, height, feed, where, profile, poses, 2 * step)
     hint = -1
     for k in range(radius.size):
         start[k, :] = np.nan
         stop[k, :] = np.nan
-        size = math.hypot(feed[k, 0], feed[k, 1])
-        if feed[k, 2] <= -size:
+        low, high = _leading(feed[k])
+        if high <= low:
             continue
-        middle = math.atan2(feed[k, 0], feed[k, 1])
-        half = math.pi if feed[k, 2] >= size else math.acos(-feed[k, 2] / size)
-        low, high = middle - half, middle + half
         count = max(4, math.ceil((high - low) / step))
         found = 0
         before, was = low, False
@@ -153,16 +248,14 @@ def arcs(
                 phi += tolerance
             elif i == count:
                 phi -= tolerance
-            now, hint = _probe(radius[k], height[k], phi, origin, axes, profile, poses, stock, z_knots, radius_knots,
-                               hint)
+            now, hint = _probe(radius[k], height[k], phi, where, profile, poses, ball, inner, hint)
             if i == 0:
                 was = now
             elif now != was:
                 a, b = before, phi
                 while b - a > tolerance:
                     c = (a + b) / 2
-                    at, hint = _probe(radius[k], height[k], c, origin, axes, profile, poses, stock, z_knots,
-                                      radius_knots, hint)
+                    at, hint = _probe(radius[k], height[k], c, where, profile, poses, ball, inner, hint)
                     if at == was:
                         a = c
                     else:
@@ -184,49 +277,16 @@ def arcs(
 
 
 @njit(cache=True)
-def _probe(
-    radius: float, height: float, phi: float, origin: Array, axes: Array, profile: Array, poses: Array, stock: Array,
-    z_knots: Array, radius_knots: Array, hint: int,
-) -> tuple[bool, int]:
-    """Whether there is material at the angle phi of a circle on the tool, and the pose that took it otherwise."""
-    x, y = radius * math.sin(phi), radius * math.cos(phi)
-    px = origin[0] + axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * height
-    py = origin[1] + axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * height
-    pz = origin[2] + axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * height
-    if not in_stock(stock, z_knots, radius_knots, px, py, pz):
-        return False, hint
-    found = covered_by(profile, poses, px, py, pz, hint)
-    return found < 0, found if found >= 0 else hint
-
-
-@njit(cache=True)
-def near(poses: Array, centre: Array, size: float, profile: Array, chosen: Array) -> int:
-    """Put the poses (K, 12) whose tool may reach into the ball `size` around `centre` into `chosen`; their number."""
-    count = 0
-    for k in range(len(poses)):
-        dx, dy, dz = centre[0] - poses[k, 0], centre[1] - poses[k, 1], centre[2] - poses[k, 2]
-        h = dx * poses[k, 3] + dy * poses[k, 4] + dz * poses[k, 5]
-        if h < -size or h > profile[TOP] + size:
-            continue
-        lateral = math.sqrt(max(dx * dx + dy * dy + dz * dz - h * h, 0.0))
-        if lateral < size + math.sqrt(profile[WIDEST]):
-            chosen[count] = poses[k]
-            count += 1
-    return count
-
-
-@njit(cache=True)
 def touching(
-    profile: Array, origin: Array, axes: Array, stock: Array, z_knots: Array, radius_knots: Array, radii: Array,
-    heights: Array, angles: int, result: Array,
+    origin: Array, axes: Array, stock: Array, z_knots: Array, radius_knots: Array, radii: Array, heights: Array,
+    angles: int, result: Array,
 ) -> None:
     """Set result (n,) to 1 where a circle of the tool (radii, heights) has one of `angles` points in the stock."""
-    poses = np.empty((0, 12))
+    where = (origin, axes, stock, z_knots, radius_knots)
     for k in range(radii.size):
         result[k] = 0.0
         for i in range(angles):
-            phi = 2 * math.pi * i / angles
-            hit, _ = _probe(radii[k], heights[k], phi, origin, axes, profile, poses, stock, z_knots, radius_knots, -1)
-            if hit:
+            x, y, z = _place(radii[k], heights[k], 2 * math.pi * i / angles, where)
+            if in_stock(stock, z_knots, radius_knots, x, y, z):
                 result[k] = 1.0
                 break
