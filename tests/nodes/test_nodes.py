@@ -202,6 +202,32 @@ def test_the_force_predictor_estimates_the_scale_of_the_force_coefficients(probe
     assert {m.header.frame_id for m in found["wrench/measured"]} == {"machine"}
 
 
+def test_the_stability_monitor_draws_lobes_again_where_the_workpiece_turns_faster(probe: Probe) -> None:
+    """In a process of its own; an unchanged cut asks for none."""
+    op = operation("thesis_table_4_9")
+    publish_operation(probe, op)
+    probe.listen(topics.STABILITY_LOBES)
+    probe.announce(topics.JOINT_STATES)
+    monitor = probe.add(StabilityMonitor, lobe_points=2, match=["joint_states=1", "stability_lobes=1"])
+    assert support.start(monitor)
+    heard, state = probe.heard["stability_lobes"], axis_state_at(op, 1.0, 0)
+
+    def feed(factor: float, drawn: int, start: int) -> bool:
+        velocity = (*state.velocity[:2], factor * state.velocity[2], 0.0, factor * state.velocity[4], state.velocity[5])
+        for k in range(300):
+            moved = replace(state, stamp_ns=start + k * 100_000_000, velocity=velocity)
+            probe.publish(topics.JOINT_STATES, axes_to_message(moved, ros_types()))
+            if probe.until(lambda: len(heard) >= drawn, 0.1):
+                return True
+        return False
+
+    assert feed(1.0, 1, 10**9)
+    assert feed(3.5, 2, 10**11)
+    assert probe.until(lambda: probe.value("stability_monitor", "diagram_in_work") == "False")
+    assert heard[1].workpiece_speed == pytest.approx(3.5 * op.conditions.workpiece_speed)
+    assert (len(heard[0].tool_speeds), len(heard[0].depths)) == (2, 32)
+
+
 def test_the_stability_monitor_answers_and_repeats_an_unchanged_cut_cheaply(probe: Probe) -> None:
     op = operation("milling_benchmark_1dof")
     publish_operation(probe, op)

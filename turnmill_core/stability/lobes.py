@@ -14,6 +14,7 @@ from turnmill_core.stability.delay import DelayModel
 from turnmill_core.stability.floquet import kinds
 from turnmill_core.stability.operating_point import depth_family
 from turnmill_core.stability.search import StableDepths, stable_depths
+from turnmill_core.structure.at import Position
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -58,16 +59,17 @@ class Boundary:
 def stability_lobes(
     op: Operation, tool_speeds: Sequence[float] | Floats, depths: Sequence[float] | Floats,
     workpiece_speed: float | None = None, progress: Progress | None = None, delay_model: DelayModel = "mean",
+    position: Position | None = None,
 ) -> Lobes:
     """Stability diagram over tool_speeds [rad/s] and depths [m], both ascending; every point is classified.
 
     workpiece_speed [rad/s] (None: the operation's). progress: called with (done, total) tool speeds.
-    delay_model: as in stability_problem. Raises ``ValueError`` for values that are not positive, not
+    delay_model, position: as in stability_problem. Raises ``ValueError`` for values that are not positive, not
     ascending, or beyond the flute length.
     """
     speed, depth = _ascending("tool speeds", tool_speeds, "rad/s"), _ascending("depths", depths, "m")
     conditions = with_cut(op, tool_speed=float(speed[0]), workpiece_speed=workpiece_speed, depth=float(depth[-1]))
-    family = depth_family(op, conditions, float(depth[-1]), delay_model)
+    family = depth_family(op, conditions, float(depth[-1]), delay_model, position)
     series = family.series(depth)
     multipliers = np.empty((depth.size, speed.size), dtype=np.complex128)
     for j, s in enumerate(speed):
@@ -82,15 +84,16 @@ def stability_lobes(
 def stability_boundary(
     op: Operation, tool_speeds: Sequence[float] | Floats, deepest: float, workpiece_speed: float | None = None,
     progress: Progress | None = None, delay_model: DelayModel = "mean", scan: int = 16,
+    position: Position | None = None,
 ) -> Boundary:
     """Stable depth intervals up to `deepest` [m] at each of tool_speeds [rad/s], edges refined.
 
-    workpiece_speed [rad/s], progress, delay_model: as in stability_lobes. scan: depths sampled at each speed before
-    the edges are refined; an island thinner than deepest / scan may be missed.
+    workpiece_speed [rad/s], progress, delay_model, position: as in stability_lobes. scan: depths sampled at each speed
+    before the edges are refined; an island thinner than deepest / scan may be missed.
     """
     speed = _ascending("tool speeds", tool_speeds, "rad/s")
     conditions = with_cut(op, tool_speed=float(speed[0]), workpiece_speed=workpiece_speed, depth=deepest)
-    family = depth_family(op, conditions, deepest, delay_model)
+    family = depth_family(op, conditions, deepest, delay_model, position)
     series = family.series(np.linspace(0.0, deepest, scan + 1)[1:])
     found = []
     for j, s in enumerate(speed):

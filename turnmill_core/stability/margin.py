@@ -22,6 +22,7 @@ from turnmill_core.stability.lobes import stability_lobes as stability_lobes
 from turnmill_core.stability.operating_point import depth_family, stability_problem
 from turnmill_core.stability.problem import StabilityProblem
 from turnmill_core.stability.search import depth_limit, stable_depths
+from turnmill_core.structure.at import Position
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -82,14 +83,17 @@ class Margin:
     limit_frequency: float
 
 
-def stability_point(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> StabilityPoint:
+def stability_point(
+    op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", position: Position | None = None,
+) -> StabilityPoint:
     """Stability of `op` at `conditions`; NO_CUT where the tool does not touch the workpiece.
 
+    delay_model, position: as in stability_problem.
     Raises ``ValueError`` for a rigid structure or a depth beyond the flute length.
     """
     if not conditions.in_cut:
         return StabilityPoint(NAN, np.empty(0, np.complex128), PredictedType.NO_CUT, NAN, np.empty(0), NAN, NAN)
-    return _judged(stability_problem(op, conditions, delay_model))
+    return _judged(stability_problem(op, conditions, delay_model, position))
 
 
 def _judged(problem: StabilityProblem) -> StabilityPoint:
@@ -114,12 +118,13 @@ def searched_depth(op: Operation, conditions: Conditions) -> float:
 
 def stability_margin(
     op: Operation, conditions: Conditions, depth_search: float | None = None, delay_model: DelayModel = "mean",
-    speed_search: bool = True,
+    speed_search: bool = True, position: Position | None = None,
 ) -> Margin:
     """Margin of `op` at `conditions`: stable depth intervals, limit, ratio and the nearest stable tool speed.
 
     depth_search [m]: largest depth that is searched (None: :func:`searched_depth`). speed_search: whether
-    the nearest stable speed is looked for when the cut is unstable. Without contact the type is NO_CUT and
+    the nearest stable speed is looked for when the cut is unstable. delay_model, position: as in
+    stability_problem. Without contact the type is NO_CUT and
     the limit is that of the cut at these speeds and this immersion, where there is one.
     Raises ``ValueError`` for a rigid structure or a depth beyond the flute length.
     """
@@ -127,9 +132,9 @@ def stability_margin(
     require(0 < searched <= op.tool.flute_length, "depth search", searched, "m",
             f"in (0, {op.tool.flute_length}] m, the flute length")
     cuts = conditions.tool_speed > 0 and conditions.radial_immersion > 0
-    family = depth_family(op, conditions, max(searched, conditions.depth), delay_model) if cuts else None
-    point = stability_point(op, conditions, delay_model) if family is None or not conditions.in_cut else _judged(
-        family.problem(conditions.depth))
+    family = depth_family(op, conditions, max(searched, conditions.depth), delay_model, position) if cuts else None
+    point = stability_point(op, conditions, delay_model, position) if family is None or not conditions.in_cut else (
+        _judged(family.problem(conditions.depth)))
     base = {
         "tool_speed": conditions.tool_speed, "workpiece_speed": conditions.workpiece_speed, "depth": conditions.depth,
         "depth_searched": searched, "spectral_radius": point.spectral_radius, "multipliers": point.multipliers,
@@ -147,19 +152,22 @@ def stability_margin(
         limit_type, limit_frequency = above.predicted_type, above.chatter_frequency
     nearest = conditions.tool_speed
     if point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP):
-        nearest = nearest_stable_speed(op, conditions, delay_model) if speed_search else NAN
+        nearest = nearest_stable_speed(op, conditions, delay_model, position) if speed_search else NAN
     ratio = max(conditions.depth, 0.0) / limit if limit > 0 else math.inf
     return Margin(**base, depth_limit=limit, stable_depths=intervals, depth_ratio=ratio,  # type: ignore[arg-type]
                   nearest_stable_speed=nearest, limit_type=limit_type, limit_frequency=limit_frequency)
 
 
-def nearest_stable_speed(op: Operation, conditions: Conditions, delay_model: DelayModel = "mean") -> float:
+def nearest_stable_speed(
+    op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", position: Position | None = None,
+) -> float:
     """Tool speed [rad/s] nearest to the present one that is stable at this depth; NaN where none was found.
 
     Searched outwards in steps of SPEED_STEP up to SPEED_RANGE of the present speed; where both sides are
-    stable at the same distance, the one with the smaller spectral radius. delay_model: as in stability_problem.
+    stable at the same distance, the one with the smaller spectral radius. delay_model, position: as in
+    stability_problem.
     """
-    family = depth_family(op, conditions, conditions.depth, delay_model)
+    family = depth_family(op, conditions, conditions.depth, delay_model, position)
     series = family.series([conditions.depth])
     for i in range(1, round(SPEED_RANGE / SPEED_STEP) + 1):
         stable = []

@@ -116,9 +116,9 @@ class DepthFamily:
         else:
             delays = regeneration(self.op, at_depth(self.op, self.conditions, None, speed), self.delay_model)[0]
         shapes = (self.op.tool.structure, self.op.workpiece.structure)
-        if not any(shape.heights for shape in shapes):
+        if not any(shape.heights for shape in shapes) and self.op.workpiece.beam is None:
             return series_multipliers(series, speed, delays, variation, self.structure(tool_speed=speed).linear)
-        return np.concatenate([  # the depth of cut weighs the contact points
+        return np.concatenate([  # the depth of cut weighs the contact points, and thins the bar
             series_multipliers(series.one(i), speed, delays, variation[i:i + 1],
                                self.structure(float(series.heights[i, -1]), speed).linear)
             for i in range(len(series.heights))])
@@ -236,3 +236,20 @@ def at_depth(
     radius = conditions.effective_radius + conditions.depth - a
     require(radius > 0, "depth", a, "m", f"less than the bar's radius {op.workpiece.radius} m")
     return replace(conditions, depth=a, effective_radius=radius, tool_speed=speed)
+
+
+def structure_key(op: Operation, conditions: Conditions, position: Position | None, change: float) -> tuple[int, ...]:
+    """Natural frequencies and compliance of the structure in steps of `change`: equal where they hardly differ.
+
+    Poles and largest mobility at the cutting point, for the nominal tool speed of `op`; position: as in
+    stability_problem. Says whether place or shape of the workpiece ask for another prediction; empty where they never
+    do, and for a rigid structure.
+    """
+    tool, piece = op.tool.structure, op.workpiece.structure
+    if tool.table is None and piece.table is None and op.workpiece.beam is None and piece.frame != "rotating":
+        return ()
+    there = at_depth(op, conditions, conditions.depth, op.conditions.tool_speed)
+    s = structure_at(op, machine_from_tool(op, there), there, position).linear
+    poles = np.abs(modal_blocks(s).lam)
+    static = np.linalg.norm(s.C[:2] @ np.linalg.solve(s.A, s.B), axis=1)
+    return tuple(np.round(np.log(np.concatenate([np.sort(poles), static + 1e-15])) / change).astype(int).tolist())

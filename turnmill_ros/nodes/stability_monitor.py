@@ -2,36 +2,40 @@
 
 from __future__ import annotations
 
-import threading
-from concurrent.futures import Future, wait
+import math
+import time
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-import rclpy
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 from turnmill_msgs.srv import GetStability
 
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, with_cut
 from turnmill_core.operation import Conditions, Operation
-from turnmill_core.stability.lobes import stability_lobes
-from turnmill_core.stability.margin import Margin, searched_depth, stability_margin
+from turnmill_core.stability.margin import Margin, stability_margin
+from turnmill_core.stability.operating_point import structure_key
 from turnmill_ros import topics
 from turnmill_ros.conversions import axes_from_message, lobes_to_message, margin_to_message, scalar_to_message
 from turnmill_ros.interfaces import ros_types
+from turnmill_ros.lobe_process import LobeProcess, LobeRequest
 from turnmill_ros.node_table import MARGIN_PLOTS
 from turnmill_ros.nodes import _support as support
-from turnmill_ros.nodes._worker import Worker
 from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.parameters import declare
 from turnmill_ros.predicted import CHANGE, Cut, grid
 
+LOBE_CHANGE = 0.02
+"""Relative change of workpiece speed, natural frequencies or compliance that asks for another diagram."""
+BUSY = 0.5
+"""Share of the time that margins may take; slower ones come less often."""
+
 
 class StabilityMonitor(LifecycleNode):
-    """Evaluates the cut when it changes, in a worker thread; an unchanged cut only gets a new stamp.
+    """Evaluates the cut when it changes; an unchanged cut only gets a new stamp. Diagrams come from another process.
 
-    Live, a worker that is busy leaves cuts out; with `every_change` (replay) it takes them all in turn.
+    Where margins take longer than BUSY of the time between them, the next one waits in proportion; with `every_change`
+    (replay) none does.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -46,14 +50,12 @@ class StabilityMonitor(LifecycleNode):
         self._match, lossless = support.declare_common(self)
         self._operations, self._next_ns, self._refused = OperationTrack(), 0, ""
         self._last: tuple[Cut, Margin] | None = None
-        self._pending: list[Future[None]] = []
-        self._drawn: set[tuple[str, float]] = set()
-        self._received = self._evaluated = self._sent = self._left_out = 0
-        self._worker, self._drawer, self._hurried = Worker("margin"), Worker("lobes"), threading.Event()
-        self._drawing: list[Future[None]] = []
+        self._lobes, self._drawn, self._hurried = LobeProcess(), (), False
+        self._received = self._evaluated = self._sent = 0
+        self._slowest = 0.0
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.STABILITY_MARGIN, topics.STABILITY_LOBES, *MARGIN_PLOTS)}
-        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None, paced=lossless)
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes)
         self.create_service(GetStability, "get_stability", self.on_get)
@@ -66,128 +68,107 @@ class StabilityMonitor(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> None:
         """Compile the solver on the operation that is published."""
         operation = support.wait_for_operation(self, self._operations)
-        if operation.tool.structure.modes or operation.workpiece.structure.modes:
+        if operation.tool.structure.flexible or operation.workpiece.structure.flexible or operation.workpiece.beam:
             stability_margin(operation, operation.conditions)
 
     @support.transition
     def on_activate(self, state: LifecycleState) -> None:
         """Wait for axis states."""
         support.wait_until_matched(self, self._match)
-        self._next_ns = 0
-        self._hurried.clear()
+        self._next_ns, self._hurried = 0, False
         self.diagnostics.enter(support.ACTIVE)
 
     @support.transition
     def on_deactivate(self, state: LifecycleState) -> None:
-        """Finish what was begun (in a replay: all that has arrived), then stop."""
+        """Judge what has arrived (in a replay: finish the diagram too), then stop."""
         support.drain(self)
-        if not self._every:
-            self.hurry()
-        while wait([*self._pending, *self._drawing], 0.1).not_done:
-            if self._hurried.is_set():
-                break
+        while self._every and self._lobes.busy and not self._hurried:
+            self._send_lobes(wait=0.1)
+        self._lobes.close()
         support.wait_until_acknowledged(self)
         self.diagnostics.enter("stopped", done=True)
 
     def hurry(self) -> None:
-        """Leave out all cuts that wait, and do not wait for what is being computed."""
-        self._hurried.set()
-        for pending in (*self._pending, *self._drawing):
-            pending.cancel()
+        """Judge nothing more and do not wait for a diagram."""
+        self._hurried = True
 
     def on_axes(self, message: Any) -> None:
         """Judge the cut of an axis state, if it is time to."""
         self._received += 1
+        self._send_lobes()
         stamp = support.stamp_ns(message)
-        if stamp >= self._next_ns or stamp < self._next_ns - 10 * self._period_ns:
-            self._next_ns = stamp + self._period_ns
-            axes = axes_from_message(message)
-            operation = self._operations.at(stamp)
-            if operation is not None:
-                self._judge(operation, axes)
+        operation = self._operations.at(stamp)
+        if self._hurried or operation is None or self._next_ns - 10 * self._period_ns <= stamp < self._next_ns:
+            return
+        begin = time.monotonic()
+        self._judge(operation, axes_from_message(message))
+        taken = time.monotonic() - begin
+        self._slowest = max(self._slowest, taken)
+        self._next_ns = stamp + max(self._period_ns, 0 if self._every else round(taken / BUSY * 1e9))
 
-    async def on_get(self, request: Any, response: Any) -> Any:
+    def on_get(self, request: Any, response: Any) -> Any:
         """Margin of a cut that may differ from the present one."""
-        operation = self._operations.at(self.get_clock().now().nanoseconds)
+        stamp = self.get_clock().now().nanoseconds
+        operation = self._operations.at(stamp)
         try:
             if operation is None:
                 raise ValueError("no operation is loaded")
             asked = (request.tool_speed, request.workpiece_speed, request.depth)
-            cut = with_cut(operation, *(None if np.isnan(value) else value for value in asked))
-            margin = await self._work(stability_margin, operation, cut)
+            cut = with_cut(operation, *(None if math.isnan(value) else value for value in asked))
+            margin = stability_margin(operation, cut)
         except ValueError as error:
             response.success, response.message = False, str(error)
             return response
         response.success = True
-        response.margin = margin_to_message(margin, self.get_clock().now().nanoseconds, operation.sha256, ros_types())
+        response.margin = margin_to_message(margin, stamp, operation.sha256, ros_types())
         return response
 
-    async def _work(self, function: Any, *arguments: Any) -> Any:
-        """Result of a call in the worker; callbacks run meanwhile."""
-        told, executor = rclpy.task.Future(executor=self.executor), self.executor
-        job = self._worker.submit(function, *arguments)
-        job.add_done_callback(lambda _: (told.set_result(None), executor.wake()))
-        await told
-        return job.result()
-
     def _judge(self, operation: Operation, axes: AxisState) -> None:
+        """Publish the margin of a cut, computed anew only where the cut differs from the last one."""
         try:
             cut = conditions_from_axes(operation, axes)
+            key = grid(cut, operation, axes.position, self._step)
+            if self._last is None or self._last[0] != key:
+                self._last = key, stability_margin(operation, cut, position=axes.position)
+                self._evaluated += 1
+            if self._lobe_points and cut.in_cut:
+                self._want_lobes(operation, cut, axes)
             self._refused = ""
         except ValueError as error:
-            self._refused = f"no prediction: {error}"
-            return
-        for done in [pending for pending in self._pending if pending.done()]:
-            self._pending.remove(done)
-            done.result()
-        if self._pending and not self._every:
-            self._left_out += 1
-        else:
-            self._pending.append(self._worker.submit(self._evaluate, operation, cut, axes.stamp_ns))
-        key = (operation.sha256, round(cut.workpiece_speed, 3))
-        if self._lobe_points and cut.in_cut and key not in self._drawn:
-            self._drawn.add(key)
-            self._drawing.append(self._drawer.submit(self._draw, operation, cut, axes.stamp_ns))
-
-    def _evaluate(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
-        """In the worker: the margin of a cut, computed anew only where the cut differs from the last one."""
-        key = grid(cut, operation, self._step)
-        try:
-            if self._last is None or self._last[0] != key:
-                self._last = key, stability_margin(operation, cut)
-                self._evaluated += 1
-            self._publish(operation, replace(self._last[1], depth=cut.depth), stamp_ns)
-        except ValueError as error:
             self._last, self._refused = None, f"no prediction: {error}"
+            return
+        self._publish(operation, replace(self._last[1], depth=cut.depth), axes.stamp_ns)
 
     def _publish(self, operation: Operation, margin: Margin, stamp_ns: int) -> None:
-        if self._hurried.is_set():
-            return
         types = ros_types()
-        message = margin_to_message(margin, stamp_ns, operation.sha256, types)
-        support.send(self._out[topics.STABILITY_MARGIN], message)
+        support.send(self._out[topics.STABILITY_MARGIN], margin_to_message(margin, stamp_ns, operation.sha256, types))
         for topic, value in zip(MARGIN_PLOTS, (margin.depth, margin.depth_ratio, margin.spectral_radius), strict=True):
             support.send(self._out[topic], scalar_to_message(value, types))
         self._sent += 1
 
-    def _draw(self, operation: Operation, cut: Conditions, stamp_ns: int) -> None:
-        """In a worker of its own: the stability diagram, once for each operation and workpiece speed."""
-        speeds = operation.conditions.tool_speed * np.linspace(0.7, 1.3, self._lobe_points)
-        depths = np.linspace(0.0, searched_depth(operation, cut), 33)[1:]
-        try:
-            lobes = stability_lobes(operation, speeds, depths, cut.workpiece_speed, self._go_on)
-        except (InterruptedError, ValueError):
-            return
-        support.send(self._out[topics.STABILITY_LOBES],
-                     lobes_to_message(lobes, stamp_ns, operation.sha256, ros_types()))
+    def _want_lobes(self, operation: Operation, cut: Conditions, axes: AxisState) -> None:
+        """Ask for a diagram where operation, workpiece speed or structure are new."""
+        speed = round(math.log(max(abs(cut.workpiece_speed), 1e-6)) / LOBE_CHANGE)
+        key = (operation.sha256, speed, structure_key(operation, cut, axes.position, LOBE_CHANGE))
+        if key != self._drawn:
+            self._drawn = key
+            self._lobes.want(LobeRequest(operation, cut, axes.position, axes.stamp_ns, self._lobe_points))
 
-    def _go_on(self, done: int, total: int) -> None:
-        if self._hurried.is_set():
-            raise InterruptedError
+    def _send_lobes(self, wait: float = 0.0) -> None:
+        """Publish a diagram that has been finished."""
+        found = self._lobes.found(wait)
+        if found is None:
+            return
+        request, lobes = found
+        if isinstance(lobes, str):
+            self._refused = f"no diagram: {lobes}"
+        else:
+            support.send(self._out[topics.STABILITY_LOBES],
+                         lobes_to_message(lobes, request.stamp_ns, request.op.sha256, ros_types()))
 
     def _values(self) -> dict[str, object]:
         return {"joint_states_received": self._received, "margins_sent": self._sent, "cuts_evaluated": self._evaluated,
-                "cuts_left_out": self._left_out, "cuts_waiting": sum(not pending.done() for pending in self._pending)}
+                "slowest_margin_s": round(self._slowest, 3), "diagram_in_work": self._lobes.busy}
 
 
 if __name__ == "__main__":
