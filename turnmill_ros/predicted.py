@@ -9,6 +9,8 @@ from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.operation import Conditions, Operation
 from turnmill_core.prediction import Prior
 from turnmill_core.stability.margin import StabilityPoint, stability_point
+from turnmill_core.stability.operating_point import structure_key
+from turnmill_core.structure.at import Position
 
 CHANGE = 0.005
 """Relative change of speed, depth or immersion that is a new cut."""
@@ -23,10 +25,14 @@ class Cut(NamedTuple):
     depth: int
     lower: int
     upper: int
+    structure: tuple[int, ...]
 
 
-def grid(cut: Conditions, operation: Operation, change: float = CHANGE) -> Cut:
-    """The cut in steps of `change` relative to the operation: equal for cuts that differ less than a step."""
+def grid(cut: Conditions, operation: Operation, position: Position, change: float = CHANGE) -> Cut:
+    """The cut in steps of `change` relative to the operation: equal for cuts that differ less than a step.
+
+    position: axis positions, on which the structure may depend.
+    """
     nominal, radius = operation.conditions, operation.tool.radius
 
     def steps(value: float, scale: float) -> int:
@@ -34,7 +40,8 @@ def grid(cut: Conditions, operation: Operation, change: float = CHANGE) -> Cut:
 
     return Cut(operation.sha256, steps(cut.tool_speed, nominal.tool_speed),
                steps(cut.workpiece_speed, nominal.workpiece_speed), steps(max(cut.depth, 0.0), nominal.depth),
-               steps(cut.cross_feed_span[0], radius), steps(cut.cross_feed_span[1], radius))
+               steps(cut.cross_feed_span[0], radius), steps(cut.cross_feed_span[1], radius),
+               structure_key(operation, cut, position, change))
 
 
 class Predictor:
@@ -50,9 +57,9 @@ class Predictor:
         """
         try:
             cut = conditions_from_axes(operation, axes)
-            key = grid(cut, operation)
+            key = grid(cut, operation, axes.position)
             if self._known is None or self._known[0] != key:
-                self._known = key, stability_point(operation, cut)
+                self._known = key, stability_point(operation, cut, position=axes.position)
         except ValueError:
             self._known = None
             return None
