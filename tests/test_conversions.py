@@ -185,7 +185,7 @@ def test_margin_keeps_every_field():
     assert back.keys() == vars(margin).keys()
     assert all(np.array_equal(back[name], value) for name, value in vars(margin).items())
     prior = conversions.prior_from_margin(message)
-    assert prior == Prior(9, PredictedType.FLIP, margin.spectral_radius, margin.chatter_frequency)
+    assert prior == Prior(9, PredictedType.FLIP, margin.spectral_radius, margin.chatter_frequency, 1.1)
 
 
 def test_values_of_the_core_have_the_fields_of_their_messages():

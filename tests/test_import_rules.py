@@ -21,6 +21,7 @@ ROOMS: dict[str, set[str]] = {
     "stability": {"machine", "cutting", "structure"},
     "process": {"machine", "cutting", "structure", "stability"},
     "monitoring": set(),
+    "detection": {"machine", "cutting", "structure", "stability", "process", "monitoring"},
 }
 # Values of a room that others may use without knowing the room: the simulator makes blocks, the monitor judges them.
 SHARED_VALUES = {"process": "turnmill_core.monitoring.blocks."}

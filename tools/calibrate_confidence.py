@@ -1,6 +1,6 @@
-"""Fit the logistic maps of turnmill_core/monitoring/confidence.py on random simulated cuts, and test them on others.
+"""Fit the logistic maps of turnmill_core/monitoring/confidence.py on training cuts of the corpus; test them on others.
 
-    python -m tools.calibrate_confidence [--train 400] [--test 200]
+    python -m tools.calibrate_confidence [--train 24] [--test 12] [--jobs 2]
 
 Prints the table WEIGHTS, and for cuts that were not used to fit: how often verdicts of each stated probability were
 right. The verdict's other fields do not depend on the weights.
@@ -9,26 +9,29 @@ right. The verdict's other fields do not depend on the weights.
 from __future__ import annotations
 
 import argparse
-import math
 from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 
 import numpy as np
 from scipy import optimize
 
-from tools.corpus import make, right, run
+from turnmill_core.detection.cuts import KINDS, TRAIN_END, make_cut
+from turnmill_core.detection.hearing import listen
+from turnmill_core.detection.recordings import observe, simulate_cut, true_kinds
 from turnmill_core.monitoring import window
+from turnmill_core.monitoring.chatter import config_from_operation
 from turnmill_core.monitoring.confidence import EVIDENCE, WEIGHTS
-from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_core.monitoring.verdict import ChatterKind, Reason
 
-FIRST_TEST = 10_000
 SHRINK = 0.02
 TOGETHER = ((ChatterKind.AIR,), (ChatterKind.STABLE,), (ChatterKind.MARGINAL,), (ChatterKind.HOPF,),
             (ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT))
 """States that share a map (flip needs an odd number of teeth and is rare by itself)."""
 
+Row = tuple[int, float, np.ndarray]
 
-def rows(number: int) -> list[tuple[int, float, np.ndarray]]:
+
+def rows(case: tuple[str, int]) -> list[Row]:
     """State, right or wrong, evidence, for every verdict on a case that can be told right from wrong."""
     seen: list[np.ndarray] = []
     evidence = window.evidence
@@ -37,24 +40,44 @@ def rows(number: int) -> list[tuple[int, float, np.ndarray]]:
         seen.append(evidence(*arguments))
         return seen[-1]
 
+    motion = simulate_cut(make_cut(*case))
+    observed = observe(motion)
     window.evidence = watched
     try:
-        heard = run(make(number))
+        verdicts = listen(config_from_operation(motion.cut.operation), observed)
     finally:
         window.evidence = evidence
-    judged = [k for k, v in enumerate(heard.verdicts) if math.isfinite(v.asynchronous_ratio)]
-    truth = {kind: right(kind, heard) for kind in ChatterKind}
-    found = [(heard.verdicts[k].state, e, k) for k, e in zip(judged, seen, strict=True)]
-    return [(int(state), truth[state][k], e) for state, e, k in found if math.isfinite(truth[state][k])]
+    truth = true_kinds(motion.cut, observed, verdicts)
+    judged = [k for k, v in enumerate(verdicts) if v.state is not ChatterKind.UNKNOWN]
+    found = [(verdicts[k].state, right(verdicts[k].state, verdicts[k].reason, truth[k]), e)
+             for k, e in zip(judged, seen[-len(judged):], strict=True)]
+    return [(int(state), outcome, e) for state, outcome, e in found if outcome is not None]
 
 
-def gather(first: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """States, right or wrong, evidence and case number of all verdicts on cases first ... first + count - 1."""
-    with ProcessPoolExecutor(2) as pool:
-        found = list(pool.map(rows, range(first, first + count), chunksize=4))
-    flat = [(s, r, e, n) for n, case in enumerate(found) for s, r, e in case]
-    return (np.array([f[0] for f in flat]), np.array([f[1] for f in flat]), np.array([f[2] for f in flat]),
-            np.array([f[3] for f in flat]))
+def right(state: ChatterKind, reason: Reason, truth: ChatterKind | None) -> float | None:
+    """1 where a state is right, 0 where it is wrong, None where that cannot be said.
+
+    MARGINAL is right near the thresholds, where the truth is none; FLIP_OR_RUNOUT wherever it is one of them.
+    """
+    if state is ChatterKind.MARGINAL:
+        return float(truth is None)
+    if truth is None:
+        return None
+    if state is ChatterKind.FLIP_OR_RUNOUT:
+        return float(truth in (ChatterKind.FLIP, ChatterKind.STABLE) and reason is not Reason.PERSISTENCE)
+    return float(state is truth)
+
+
+def cases(first: int, count: int) -> list[tuple[str, int]]:
+    """`count` cases of every kind."""
+    return [(kind, n) for n in range(first, first + count) for kind in KINDS]
+
+
+def gather(first: int, count: int, jobs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States, right or wrong and evidence of all verdicts on `count` cases of every kind from number `first` on."""
+    with ProcessPoolExecutor(jobs) as pool:
+        flat = [row for case in pool.map(rows, cases(first, count), chunksize=4) for row in case]
+    return np.array([f[0] for f in flat]), np.array([f[1] for f in flat]), np.array([f[2] for f in flat])
 
 
 def fit(evidence: np.ndarray, outcome: np.ndarray) -> np.ndarray:
@@ -84,13 +107,14 @@ def reliability(probability: np.ndarray, outcome: np.ndarray) -> tuple[float, li
 def main() -> None:
     """Fit, print, test."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--train", type=int, default=400)
-    parser.add_argument("--test", type=int, default=200)
+    parser.add_argument("--train", type=int, default=24, help="cases of every kind to fit")
+    parser.add_argument("--test", type=int, default=12, help="cases of every kind to test, other training cases")
+    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", action="store_true", help="test the present weights, fit none")
     args = parser.parse_args()
     weights = dict(WEIGHTS)
     if not args.keep:
-        state, outcome, evidence, _ = gather(0, args.train)
+        state, outcome, evidence = gather(0, args.train, args.jobs)
         print("WEIGHTS: dict[ChatterKind, tuple[float, ...]] = {\n    # " + ", ".join(EVIDENCE))
         for kinds in TOGETHER:
             at = np.isin(state, kinds)
@@ -100,12 +124,11 @@ def main() -> None:
                 weights[kind] = found
                 print(f"    ChatterKind.{kind.name}: {found},")
         print("}")
-    state, outcome, evidence, _ = gather(FIRST_TEST, args.test)
+    state, outcome, evidence = gather(TRAIN_END // 2, args.test, args.jobs)
     table = np.array([weights.get(ChatterKind(s), (0.0,) * len(EVIDENCE)) for s in state])
     probability = 1 / (1 + np.exp(-np.sum(table * evidence, axis=1)))
     error, bins = reliability(probability, outcome)
-    print(f"test: {len(outcome)} verdicts of {args.test} cuts, {100 * outcome.mean():.1f} % right, "
-          f"calibration error {error:.3f}")
+    print(f"test: {len(outcome)} verdicts, {100 * outcome.mean():.1f} % right, calibration error {error:.3f}")
     for mean, share, count in bins:
         print(f"  stated {mean:.3f}   right {share:.3f}   {count}")
     for kind in weights:

@@ -19,7 +19,7 @@ from turnmill_core.machine.axes import AXES, AxisState
 from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
 from turnmill_core.operation import Operation, require
-from turnmill_core.prediction import PredictedType, Prior
+from turnmill_core.prediction import PredictedType, Prior, flip_multiplier
 from turnmill_ros.interfaces import Types
 
 _TYPECODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint8): "B"}
@@ -69,6 +69,12 @@ def header_to_message(stamp_ns: int, types: Types, frame_id: str = "") -> Any:
 def scalar_to_message(value: float, types: Types) -> Any:
     """std_msgs/Float64 of a value for the plot topics, in the unit that the topic table gives."""
     return _make(types, "std_msgs/msg/Float64", data=float(value))
+
+
+def suggestion_to_message(fields: dict[str, Any], stamp_ns: int, types: Types) -> Any:
+    """turnmill_msgs/PlanSuggestion of its fields without the header (:func:`turnmill_ros.replan.answer`)."""
+    return _make(types, "turnmill_msgs/msg/PlanSuggestion", header=header_to_message(stamp_ns, types),
+                 **{**fields, "margins": _doubles(fields["margins"])})
 
 
 def clock_to_message(stamp_ns: int, types: Types) -> Any:
@@ -150,7 +156,8 @@ def prior_to_message(prior: Prior | None, types: Types) -> Any:
         stamp=time_to_message(prior.stamp_ns if prior else 0, types),
         predicted_type=int(prior.predicted_type) if prior else 0,
         spectral_radius=float(prior.spectral_radius) if prior else math.nan,
-        chatter_frequency=float(prior.chatter_frequency) if prior else math.nan)
+        chatter_frequency=float(prior.chatter_frequency) if prior else math.nan,
+        flip_multiplier=float(prior.flip_multiplier) if prior else math.nan)
 
 
 def prior_from_message(message: Any) -> Prior | None:
@@ -158,13 +165,15 @@ def prior_from_message(message: Any) -> Prior | None:
     if not message.used:
         return None
     return Prior(time_from_message(message.stamp), PredictedType(int(message.predicted_type)),
-                 float(message.spectral_radius), float(message.chatter_frequency))
+                 float(message.spectral_radius), float(message.chatter_frequency),
+                 float(getattr(message, "flip_multiplier", math.nan)))
 
 
 def prior_from_margin(message: Any) -> Prior:
     """What a turnmill_msgs/StabilityMargin tells the monitor."""
     return Prior(time_from_message(message.header.stamp), PredictedType(int(message.predicted_type)),
-                 float(message.spectral_radius), float(message.chatter_frequency))
+                 float(message.spectral_radius), float(message.chatter_frequency),
+                 flip_multiplier(map(complex, message.multipliers_real, message.multipliers_imag)))
 
 
 def verdict_to_message(verdict: Verdict, operation_hash: str, types: Types) -> Any:
@@ -180,7 +189,8 @@ def verdict_to_message(verdict: Verdict, operation_hash: str, types: Types) -> A
         level=float(verdict.level), confidence=float(verdict.confidence),
         window_start=time_to_message(verdict.window_start_ns, types),
         window_end=time_to_message(verdict.window_end_ns, types), last_sample=verdict.last_sample,
-        prior=prior_to_message(verdict.prior, types), operation_hash=operation_hash)
+        prior=prior_to_message(verdict.prior, types), operation_hash=operation_hash,
+        spindle_speed_confidence=float(verdict.spindle_speed_confidence))
 
 
 def verdict_from_message(message: Any) -> Verdict:
@@ -194,7 +204,8 @@ def verdict_from_message(message: Any) -> Verdict:
         tooth_passing_frequency=float(message.tooth_passing_frequency), spindle_speed=float(message.spindle_speed),
         spindle_speed_source=SpeedSource(int(message.spindle_speed_source)),
         asynchronous_ratio=float(message.asynchronous_ratio), half_order_ratio=float(message.half_order_ratio),
-        level=float(message.level), confidence=float(message.confidence), prior=prior_from_message(message.prior))
+        level=float(message.level), confidence=float(message.confidence), prior=prior_from_message(message.prior),
+        spindle_speed_confidence=float(getattr(message, "spindle_speed_confidence", math.nan)))
 
 
 _LOADS_VECTORS = ("force_tool_mean", "force_tool_peak", "force_machine_mean", "force_machine_peak")

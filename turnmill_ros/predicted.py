@@ -7,7 +7,7 @@ from typing import NamedTuple
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.operation import Conditions, Operation
-from turnmill_core.prediction import Prior
+from turnmill_core.prediction import Prior, flip_multiplier
 from turnmill_core.stability.margin import StabilityPoint, stability_point
 from turnmill_core.stability.operating_point import structure_key
 from turnmill_core.structure.at import Position
@@ -64,4 +64,5 @@ class Predictor:
             self._known = None
             return None
         point = self._known[1]
-        return Prior(axes.stamp_ns, point.predicted_type, point.spectral_radius, point.chatter_frequency)
+        return Prior(axes.stamp_ns, point.predicted_type, point.spectral_radius, point.chatter_frequency,
+                     flip_multiplier(complex(m) for m in point.multipliers))

@@ -8,23 +8,24 @@ import numpy as np
 import pytest
 
 from tests.monitoring.signals import comb, hopf, judged, noise, phase
-from tools.calibrate_confidence import FIRST_TEST, reliability, rows
+from tools.calibrate_confidence import cases, reliability, rows
+from turnmill_core.detection.cuts import TRAIN_END
 from turnmill_core.monitoring.confidence import EVIDENCE, WEIGHTS, confidence
 from turnmill_core.monitoring.verdict import ChatterKind
 
 
 def outcomes(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Stated probability and outcome of every verdict on cuts that the calibration has not seen."""
-    found = [row for number in range(FIRST_TEST, FIRST_TEST + count) for row in rows(number)]
+    found = [row for case in cases(TRAIN_END, count) for row in rows(case)]
     return (np.array([confidence(ChatterKind(state), e) for state, _, e in found]),
             np.array([outcome for _, outcome, _ in found]))
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_stated_probability_is_the_share_that_is_right(count: int) -> None:
     probability, outcome = outcomes(count)
     error, bins = reliability(probability, outcome)
-    assert len(outcome) > 40 * count
+    assert len(outcome) > 250 * count
     assert error < (0.06 if count < 20 else 0.03), bins
     assert probability.mean() == pytest.approx(outcome.mean(), abs=0.06 if count < 20 else 0.03)
 

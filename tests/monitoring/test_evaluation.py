@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from tests.monitoring.signals import RATE, comb, hopf, noise, phase
-from turnmill_core.monitoring.baselines import fft_energy_ratio, kalman_energy_ratio, once_per_revolution_variance
+from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring.baselines import (
+    fft_energy_ratio,
+    kalman_energy_ratios,
+    once_per_revolution_variance,
+)
 from turnmill_core.monitoring.evaluation import alarms, confusion, per_hour, recall_at, roc_area
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
 
@@ -53,7 +58,25 @@ def test_alarms_delays_and_false_alarms() -> None:
     assert early.delays == pytest.approx((0.0,))
 
 
-@pytest.mark.parametrize("indicator", [fft_energy_ratio, once_per_revolution_variance, kalman_energy_ratio])
+def _kalman(x: np.ndarray, rate: float, spindle_frequency: float) -> float:
+    turns = np.arange(len(x)) * spindle_frequency / rate
+    return float(kalman_energy_ratios(x, turns, [len(x)], round(0.2 * rate))[0])
+
+
+def test_compiled_kalman_comb_does_what_its_plain_version_does() -> None:
+    t = phase(3350 * 2 * math.pi / 60, 0.1)
+    x = comb(t, 4) + noise(len(t), 0.1, 1)
+    assert np.allclose(_kernels.kalman_comb(x, t, 12, 0.003), _kernels.kalman_comb.py_func(x, t, 12, 0.003), atol=1e-9)
+
+
+def test_kalman_comb_follows_a_harmonic_and_leaves_what_is_between() -> None:
+    t = phase(3000 * 2 * math.pi / 60, 1.0)
+    other = np.cos(2 * math.pi * 77.3 * np.arange(len(t)) / RATE)
+    left = _kernels.kalman_comb(np.cos(2 * math.pi * 3 * t) + other, t, 8, 0.003)
+    assert np.std(left[-4000:] - other[-4000:]) < 0.15
+
+
+@pytest.mark.parametrize("indicator", [fft_energy_ratio, once_per_revolution_variance, _kalman])
 def test_baselines_tell_clear_chatter_from_a_clear_cut(indicator) -> None:
     t = phase(3350 * 2 * math.pi / 60, 0.4)
     stable = comb(t, 4) + noise(len(t), 0.02, 1)

@@ -1,14 +1,18 @@
 """Published chatter indicators, to stand beside ours in every table. Each gives one number per window.
 
-They get what we get: the samples x (n,) of a window at `rate` [Hz] and the spindle_frequency [Hz].
+They get what we get and more: the samples x (n,) at `rate` [Hz], and the spindle_frequency [Hz] that our monitor
+refined, or the true rotation of the spindle.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from turnmill_core.monitoring import _kernels
 from turnmill_core.monitoring.spectrum import Array, spectrum
 
 
@@ -45,32 +49,31 @@ def once_per_revolution_variance(x: Array, rate: float, spindle_frequency: float
     return float(np.var(picked, axis=0, ddof=1).mean()) / total
 
 
-def kalman_energy_ratio(x: Array, rate: float, spindle_frequency: float, harmonics: int = 40,
-                        gain: float = 0.003) -> float:
+def kalman_energy_ratios(x: NDArray[np.float64], turns: NDArray[np.float64], ends: Sequence[int], length: int,
+                         harmonics: int = 40, gain: float = 0.003) -> Array:
     """Energy of what a comb of tracked harmonics leaves over all energy (after Caliskan, Kilic, Altintas 2018).
 
-    Every harmonic of the spindle is a rotating state that is corrected by its share of the
-    innovation at each sample: the steady state of a Kalman filter with equal noise on all harmonics.
-    Energies by the Teager-Kaiser operator x[n]^2 - x[n-1] x[n+1], over its second half. The
-    published detector takes 0.2 as its threshold and splits the residual into bands; here the whole
-    residual is one band. x: samples (n,) at `rate` [Hz]; spindle_frequency [Hz], of which `harmonics`
-    multiples are tracked; gain: correction per sample, the reciprocal of a time constant in samples.
+    Every harmonic of the spindle is a rotating state that is corrected by its share of the innovation at each
+    sample: the steady state of a Kalman filter with equal noise on all harmonics. Energies are means of the
+    Teager-Kaiser operator x[n]^2 - x[n-1] x[n+1]; the ratio is that of the residual over residual and periodic part.
+    The published detector takes 0.2 as its threshold and splits the residual into bands; here all of it is one. It runs through a signal x (n,) with `turns` (n,), revolutions of the spindle, and is read for
+    windows of `length` samples that end before each of `ends`; `harmonics` multiples of the spindle frequency are
+    tracked; gain: correction per sample, the reciprocal of a time constant in samples.
     """
-    count = max(1, min(harmonics, int(0.45 * rate / spindle_frequency)))
-    turn = np.exp(2j * math.pi * spindle_frequency / rate * np.arange(1, count + 1))
-    state = np.zeros(count, dtype=complex)
-    left = np.empty(len(x))
-    share = min(gain, 0.5 / count)
-    mean = float(np.mean(x))
-    for n, value in enumerate(x - mean):
-        state = state * turn
-        left[n] = value - state.real.sum()
-        state = state + 2 * share * left[n]
-    half = len(x) // 2
-    total = _teager_kaiser((x - mean)[half:])
-    return min(1.0, max(0.0, _teager_kaiser(left[half:]) / total)) if total > 0 else 0.0
+    fastest = float(np.max(np.diff(turns), initial=1e-9))
+    count = max(1, min(harmonics, int(0.45 / fastest)))
+    centred = x - float(np.mean(x))
+    left = _kernels.kalman_comb(centred, turns, count, min(gain, 0.5 / count))
+    chatter, periodic = (np.concatenate([[0.0], np.cumsum(_teager_kaiser(v))]) for v in (left, centred - left))
+    end = np.clip(np.asarray(ends), 2, len(x)) - 2
+    begin = np.maximum(0, end - length)
+    energy = np.maximum(0.0, chatter[end] - chatter[begin])
+    total = energy + np.maximum(0.0, periodic[end] - periodic[begin])
+    ratio: Array = np.divide(energy, total, out=np.zeros(len(end)), where=total > 0)
+    return ratio
 
 
-def _teager_kaiser(x: Array) -> float:
-    """Mean of the Teager-Kaiser energy operator."""
-    return float(np.mean(x[1:-1] ** 2 - x[:-2] * x[2:]))
+def _teager_kaiser(x: Array) -> Array:
+    """Teager-Kaiser energy operator of x (n,): (n - 2,)."""
+    found: Array = x[1:-1] ** 2 - x[:-2] * x[2:]
+    return found

@@ -22,8 +22,9 @@ class ChatterConfig:
     fallback: judge the next usable channel where the chosen one is dead or saturated.
 
     expect_axes: windows wait for spindle speeds that cover their end, at most speed_timeout [s] of
-    stamps. axis_band, nominal_band: half width of the search for the true speed, relative to the
-    axis or the nominal speed. recorded_priors: windows wait for their RecordedPrior.
+    stamps. nominal_band: half width of the search for the true speed, relative to the axis or the nominal
+    speed; axis_band: half width of its refinement around what was found. recorded_priors: windows wait
+    for their RecordedPrior.
 
     noise_floor: root mean square of the signal out of the cut, in the channel's unit (None:
     learned). gate_ratio: level over floor that shows a cut.

@@ -17,6 +17,9 @@ TRANSIENT = math.log(2.0)
 WARNING = 0.5
 """A family that will pass the enter threshold in less than this [s] makes the cut marginal."""
 
+NEAR_FLIP = 0.92
+"""Predicted magnitude of a multiplier near -1 from which half-order lines are flip: models are no better than that."""
+
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
 
@@ -35,22 +38,22 @@ class Judgement:
 
 
 def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, chattering: bool,
-          prior: Prior | None, warning: float = math.inf) -> Judgement:
+          prior: Prior | None, warning: float = math.inf, risen: float = 1.0) -> Judgement:
     """State of a window from its features.
 
     chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
-    growing family will pass the enter threshold.
+    growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there.
     """
     own = [x for x in f.lines if x.energy > 4 * background.line_energy(x.frequency)]
     asynchronous = sum(x.energy for x in own)
-    total = asynchronous + f.synchronous + (f.half.energy if config.odd else 0.0)
+    total = asynchronous + f.synchronous + f.own_half
     ratio = asynchronous / total if total > 0 else 0.0
     before = 2 * sum(background.line_energy(x) for x in f.half.members)
     half = min(1.0, max(0.0, f.half.energy - before) / f.synchronous) if f.synchronous > 0 else 0.0
     if not cut:
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
                          ratio, half)
-    kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior)
+    kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior, risen)
     if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
         kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
         text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
@@ -61,12 +64,16 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
 
 
 def _cut(config: ChatterConfig, f: Features, background: Background, ratio: float, half: float,
-         chattering: bool, prior: Prior | None) -> tuple[ChatterKind, Reason, str]:
+         chattering: bool, prior: Prior | None, risen: float) -> tuple[ChatterKind, Reason, str]:
     threshold = config.leave_ratio if chattering else config.enter_ratio
     c = f.chatter
     if c is not None and f.lines[0].energy > 4 * background.line_energy(f.lines[0].frequency):
-        share = c.energy / (c.energy + f.synchronous)
+        share = c.energy / (c.energy + f.synchronous + f.own_half)
         evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
+        now = risen * c.energy / (risen * c.energy + f.synchronous + f.own_half)
+        if evident and share < threshold < now:
+            return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
+                    f"lines at {c.frequency:.1f} Hz grow exponentially to {100 * now:.0f} % of the energy")
         if evident and share > threshold:
             return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
                     f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.principal_teeth:.1f} Hz hold "
@@ -96,8 +103,8 @@ def _half_order(config: ChatterConfig, half: float, prior: Prior | None) -> tupl
         return ChatterKind.FLIP, Reason.HALF_ORDER, text
     if prior is None or prior.predicted_type in (PredictedType.UNKNOWN, PredictedType.NO_CUT):
         return ChatterKind.FLIP_OR_RUNOUT, Reason.NO_PRIOR, text + "; flip or runout: no prediction"
-    if prior.predicted_type is PredictedType.FLIP:
-        return ChatterKind.FLIP, Reason.PRIOR_FLIP, text + "; predicted: flip"
+    if prior.predicted_type is PredictedType.FLIP or prior.flip_multiplier > NEAR_FLIP:
+        return ChatterKind.FLIP, Reason.PRIOR_FLIP, text + "; predicted: flip, or close to it"
     return ChatterKind.STABLE, Reason.PRIOR_RUNOUT, text + "; not predicted to flip: runout"
 
 

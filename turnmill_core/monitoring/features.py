@@ -40,6 +40,9 @@ LARGEST_RAMP = 0.01
 """Largest relative change of the speed over a window that is followed by the signal alone."""
 
 
+COMB_SHARE = 0.05
+"""Share of the synchronous energy from which the tooth passing harmonics alone tell the speed; else all do."""
+
 CANDIDATES = 4
 """Strongest lines that are tried as H."""
 
@@ -85,7 +88,8 @@ class Features:
     number of tooth passing harmonics above the noise, of comb_of looked at; noise: broadband
     energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
     second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
-    family that explains most of them, if any.
+    family that explains most of them, if any; own_half: energy of half-order lines that are not among the
+    spindle harmonics.
     """
 
     frequency: float
@@ -101,6 +105,7 @@ class Features:
     change: float
     lines: tuple[Line, ...]
     chatter: ChatterFamily | None
+    own_half: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
         int(np.sum(energy[first] > 10 * noise[first])), len(first), noise_energy,
         float(found.power[low:].sum() + energy[inside].sum()), _change(parts, np.flatnonzero(tooth & inside), noise),
         asynchronous,
-        _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest),
+        _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest), half.energy if teeth % 2 else 0.0,
     )
 
 
@@ -204,7 +209,12 @@ def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
 
 def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
     noise = harmonic_noise(parts.residual, len(parts.one.mean), parts.layout.frequency, 1, parts.layout.duration)
-    harmonics = np.arange(teeth, min(len(parts.one.mean), int(p.top / parts.layout.frequency)), teeth)
+    harmonics = np.arange(1, min(len(parts.one.mean), int(p.top / parts.layout.frequency)))
+    power = np.abs(parts.one.mean[harmonics]) ** 2
+    power[power < 20 * noise[harmonics]] = 0.0
+    tooth = harmonics % teeth == 0
+    if power[tooth].sum() >= COMB_SHARE * power.sum():
+        harmonics = harmonics[tooth]
     return drift(parts.layout, parts.values, harmonics, noise[harmonics])
 
 

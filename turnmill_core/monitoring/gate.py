@@ -53,9 +53,11 @@ def learn(config: ChatterConfig, background: Background, f: Features, whole: Spe
 def plain_comb(f: Features) -> bool:
     """True where the tooth passing comb stands out of the noise.
 
-    A third of its first harmonics, at least two, with 3 % of the energy, or fewer with half of it.
+    A third of its first harmonics, at least two, with 3 % of the energy, or fewer with half of it. Half-order
+    lines that are no spindle harmonics (an odd number of teeth) belong to it: they, too, turn with the tool.
     """
-    return f.tooth > (0.03 if f.comb >= max(2, -(-f.comb_of // 3)) else 0.5) * f.energy
+    enough = f.comb >= max(2, -(-f.comb_of // 3))
+    return f.tooth + f.own_half > (0.03 if enough else 0.5) * f.energy
 
 
 def in_cut(config: ChatterConfig, f: Features, background: Background, chattering: bool) -> bool:
@@ -72,7 +74,7 @@ def in_cut(config: ChatterConfig, f: Features, background: Background, chatterin
     if math.isfinite(floor) and f.energy < config.gate_ratio**2 * floor:
         return False
     c = f.chatter
-    turning = f.synchronous - f.once + (c.energy if c is not None else 0.0)
+    turning = f.synchronous - f.once + f.own_half + (c.energy if c is not None else 0.0)
     if math.isfinite(floor) and turning > 0.5 * f.energy:
         return True
     if c is None:

@@ -15,6 +15,11 @@ import numpy as np
 WINDOWS = 6
 """Windows over which a growth is looked at."""
 
+RISE_WINDOWS = 4
+"""Newest windows over which the growth is taken that tells the amplitude at the end of a window."""
+
+LARGEST_RISE = 10.0
+
 SLOWEST = 2.0
 """Growth of the amplitude [1/s] below which no warning is given."""
 
@@ -35,17 +40,26 @@ def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float) -> tuple[S
     return (*history[-WINDOWS + 1:], seen)
 
 
-def rate(history: tuple[Seen, ...]) -> float:
+def rate(history: tuple[Seen, ...], least: int = WINDOWS) -> float:
     """Growth of the amplitude [1/s] by a straight line through its logarithm; NaN where it does not grow steadily.
 
-    Steady: a full history, each window's share above the one before it.
+    Steady: at least `least` windows, each window's share above the one before it.
     """
     shares = np.array([s.share for s in history])
-    if len(history) < WINDOWS or np.any(shares <= 0) or np.any(np.diff(shares) <= 0):
+    if len(history) < least or np.any(shares <= 0) or np.any(np.diff(shares) <= 0):
         return math.nan
     t = np.array([s.time for s in history])
     t = t - t.mean()
     return float(np.sum(t * np.log(shares)) / np.sum(t**2) / 2)
+
+
+def rise(history: tuple[Seen, ...], seconds: float) -> float:
+    """Energy at the end of the newest window over its mean in it, while it grows steadily; else 1.
+
+    seconds [s]: length of the window. Half of it lies between its middle, which the mean is about, and its end.
+    """
+    found = rate(history[-RISE_WINDOWS:], RISE_WINDOWS)
+    return min(LARGEST_RISE, math.exp(found * seconds)) if found >= SLOWEST else 1.0
 
 
 def time_to(history: tuple[Seen, ...], share: float) -> float:

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
-from turnmill_core.monitoring.spectrum import Array, Spectrum
+from turnmill_core.monitoring.spectrum import PAD, Array, Spectrum
 
 MEMORY_NS = 10_000_000_000
 """Spindle speeds older than this before the newest one are forgotten [ns]."""
@@ -117,6 +118,30 @@ def comb_score(s: Spectrum, tooth_frequency: float, ratios: Array, top: float = 
     excess = np.log1p(np.minimum(s.power / s.floor, 1000.0))
     score: Array = (excess[low] * (1 - part) + excess[low + 1] * part).mean(axis=1)
     return score
+
+
+def overruled(s: Spectrum, tooth_frequency: float, ratios: Array, held: float, band: float) -> float:
+    """Ratio of true to measured speed: `held`, or another where the tooth passing comb is far plainer.
+
+    held: ratio believed so far, within +-band of which a comb counts for it; s: spectrum of a window in which the
+    speed is constant; tooth_frequency [Hz] as measured; ratios: trial ratios. Each harmonic counts with the
+    logarithm of power over floor, at the tops of the peaks only; two plain lines more are needed.
+    """
+    count = min(20, int(len(s.power) * s.step * 0.98 / (tooth_frequency * ratios[-1])))
+    if count < 1:
+        return held
+    top = ndimage.maximum_filter1d(s.power, 4 * PAD + 1)
+    excess = np.log1p(np.minimum(s.power / s.floor, 1000.0)) * (s.power / top)
+    excess[top < PLAIN * s.floor] = 0.0
+    position = np.outer(ratios, np.arange(1, count + 1)) * (tooth_frequency / s.step)
+    scores = excess[np.minimum(np.rint(position).astype(int), len(excess) - 1)].sum(axis=1)
+    best = int(np.argmax(scores))
+    near_held = float(scores[np.abs(ratios - held) <= band].max(initial=0.0))
+    return float(ratios[best]) if scores[best] > near_held + (9.0 if count > 1 else 5.0) else held
+
+
+PLAIN = 30.0
+"""Power over floor from which a line speaks against the tachometer."""
 
 
 def best_ratio(ratios: Array, scores: Array) -> tuple[float, float]:

@@ -77,3 +77,4 @@ class Verdict:
     level: float = math.nan
     confidence: float = 0.0
     prior: Prior | None = None
+    spindle_speed_confidence: float = math.nan

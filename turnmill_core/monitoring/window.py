@@ -15,7 +15,7 @@ from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
-from turnmill_core.monitoring.growth import Seen, remember, time_to
+from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
@@ -25,6 +25,7 @@ from turnmill_core.monitoring.speed import (
     comb_score,
     constant_rotation,
     family_score,
+    overruled,
     ratio_grid,
     rotation,
     speed_at,
@@ -39,17 +40,25 @@ LARGEST_SPREAD = 0.1
 FEWEST_REVOLUTIONS = 6
 SCORE_MEMORY = 0.9
 
+LOOK_EVERY = 4
+"""A wrong tachometer is looked for in every fourth window (windows overlap by three quarters or more)."""
+
+PULL = 0.3
+"""Turn of the first tooth passing harmonic's phase over a window [revolutions] that still tells the speed's error."""
+
 
 @dataclass(frozen=True)
 class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
-    ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows."""
+    ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
+    ratio around which the measured speed is refined."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
     scores: Array | None = None
     ratio: float = 1.0
     history: tuple[Seen, ...] = ()
+    middle: float = 1.0
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -103,19 +112,28 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
         turned.turns, len(p.samples), p.rate / rate)
     scores, ratio = tracker.scores, tracker.ratio
-    band = (1 - config.axis_band, 1 + config.axis_band)
     if blank.spindle_speed_source is SpeedSource.NOMINAL:
         grid = ratio_grid(config.nominal_band)
         new = _ratio_scores(config, spectrum(p.samples, p.rate, p.top), turned.mean / (2 * math.pi), grid)
         scores = new if scores is None else SCORE_MEMORY * scores + (1 - SCORE_MEMORY) * new
         ratio, _ = best_ratio(grid, scores)
-        band = (ratio - 2e-3, ratio + 2e-3)
+        middle = ratio
+    else:
+        middle = tracker.middle
+        if steady and (blank.last_sample + 1) // round(config.hop * rate) % LOOK_EVERY == 0:
+            tooth_frequency = config.principal_teeth * turned.mean / (2 * math.pi)
+            middle = overruled(spectrum(p.samples, p.rate, p.top), tooth_frequency, ratio_grid(config.nominal_band),
+                               middle, config.axis_band)
+    told = PULL / (config.principal_teeth * float(turns[-1] - turns[0]))
+    wide = max(config.axis_band, min(config.nominal_band, told))
+    band = (middle - wide, middle + wide)
     ratio = min(band[1], max(band[0], ratio))
     f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
-    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning)
+    risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
+    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen)
     held = persist(config, tracker.held, judgement.kind, plain_comb(f))
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
@@ -124,7 +142,9 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
-    return Tracker(held, background, scores, f.speed_ratio, history), verdict
+    if plain_comb(f):
+        middle += min(config.axis_band, max(-config.axis_band, f.speed_ratio - middle))
+    return Tracker(held, background, scores, f.speed_ratio, history, middle), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
@@ -143,7 +163,7 @@ def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
     c = f.chatter
     if c is None or c.sidebands == 0 or c.explained < 0.5:
         return (), math.inf
-    share = c.energy / (c.energy + f.synchronous)
+    share = c.energy / (c.energy + f.synchronous + f.own_half)
     history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), 0.02 * c.frequency)
     return history, time_to(history, config.enter_ratio)
 

@@ -1,0 +1,158 @@
+"""The monitor and its rivals on one signal of the corpus, window by window."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turnmill_core.detection.cuts import Cut, generator, make_cut
+from turnmill_core.detection.endless import go_on, quiet_motion
+from turnmill_core.detection.recordings import (
+    RATE,
+    Episode,
+    Motion,
+    Observed,
+    episode,
+    observe,
+    simulate_cut,
+    true_kinds,
+)
+from turnmill_core.monitoring.baselines import (
+    fft_energy_ratio,
+    kalman_energy_ratios,
+    once_per_revolution_variance,
+)
+from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operation, finish, initial, update
+from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+from turnmill_core.operation import Operation
+from turnmill_core.prediction import Prior, flip_multiplier
+from turnmill_core.stability.margin import stability_point
+
+INDICATORS = ("turnmill", "FFT energy ratio", "once-per-revolution variance", "Kalman comb")
+ALARMS = (ChatterKind.HOPF, ChatterKind.FLIP)
+NO_TRUTH = -1
+TACHOMETER_ERROR = 0.01
+WRONG_FREQUENCY, WRONG_FORCE = 0.05, 0.2
+
+
+@dataclass(frozen=True)
+class Heard:
+    """One signal: what was said and what was true.
+
+    kind, number, teeth: of the cut; seconds: of signal; ends (n,): of the windows [s]; truth (n,): true kind
+    or NO_TRUTH; state (n,): verdict; scores (n, 4): one column per INDICATORS; episode: the true chatter, if any; cpu:
+    of the monitor [s]; changed: windows whose state is another with a tachometer that is 1 % wrong (NaN: not asked);
+    with_prior (n,): verdict with a prior from a wrong model (empty: not asked).
+    """
+
+    kind: str
+    number: int
+    teeth: int
+    seconds: float
+    ends: NDArray[np.float64]
+    truth: NDArray[np.int8]
+    state: NDArray[np.int8]
+    scores: NDArray[np.float32]
+    episode: Episode | None
+    cpu: float
+    changed: float
+    with_prior: NDArray[np.int8]
+
+
+def listen(config: ChatterConfig, seen: Observed, prior: Prior | None = None) -> list[Verdict]:
+    """Verdicts on a signal."""
+    state, verdicts = initial(config), list[Verdict]()
+    for item in [*([] if prior is None else [prior]), *seen.items()]:
+        state, found = update(config, state, item)
+        verdicts.extend(found)
+    return [*verdicts, *finish(config, state)[1]]
+
+
+def wrong_prior(cut: Cut) -> Prior:
+    """Prediction of a model whose natural frequencies are up to 5 % off and whose force coefficients up to 20 %."""
+    rng = generator(cut.kind, cut.number, "prior")
+
+    def off(share: float) -> float:
+        return float(1 + rng.uniform(-share, share))
+
+    op = cut.operation
+    modes = tuple(replace(m, frequency=m.frequency * off(WRONG_FREQUENCY)) for m in op.tool.structure.modes)
+    material = replace(op.material, Ktc=op.material.Ktc * off(WRONG_FORCE), Krc=op.material.Krc * off(WRONG_FORCE))
+    wrong = replace(op, tool=replace(op.tool, structure=replace(op.tool.structure, modes=modes)), material=material)
+    return predicted(wrong)
+
+
+def predicted(op: Operation) -> Prior:
+    """Prediction for the nominal cut of an operation."""
+    point = stability_point(op, op.conditions)
+    return Prior(0, point.predicted_type, point.spectral_radius, point.chatter_frequency,
+                 flip_multiplier(point.multipliers))
+
+
+def score(verdict: Verdict) -> float:
+    """How strongly a verdict speaks of chatter: 1 to 2 for an alarm, below 1 for all others."""
+    if verdict.state in ALARMS:
+        return 1 + verdict.confidence
+    if verdict.state is ChatterKind.UNKNOWN:
+        return 0.0
+    return 1 - verdict.confidence if verdict.state in (ChatterKind.AIR, ChatterKind.STABLE) else 0.9
+
+
+def rivals(seen: Observed, verdicts: Sequence[Verdict]) -> NDArray[np.float32]:
+    """Published indicators (n, 3) for the windows of verdicts, at the speed that our monitor found."""
+    ends = [v.last_sample + 1 for v in verdicts]
+    found = np.zeros((len(verdicts), len(INDICATORS) - 1), dtype=np.float32)
+    samples = seen.samples.astype(np.float64)
+    for k, v in enumerate(verdicts):
+        x = samples[max(0, round(v.window_start_ns * 1e-9 * RATE)): ends[k]]
+        if len(x) > RATE // 20 and v.spindle_speed > 0:
+            frequency = v.spindle_speed / (2 * math.pi)
+            found[k, 0] = fft_energy_ratio(x, float(RATE), frequency)
+            found[k, 1] = np.nan_to_num(once_per_revolution_variance(x, float(RATE), frequency))
+    found[:, 2] = kalman_energy_ratios(samples, seen.turns, ends, RATE // 5)
+    return found
+
+
+def _heard(cut: Cut, seen: Observed, config: ChatterConfig) -> tuple[Heard, list[Verdict]]:
+    begin = time.process_time()
+    verdicts = listen(config, seen)
+    cpu = time.process_time() - begin
+    scores = np.column_stack([np.array([score(v) for v in verdicts], dtype=np.float32), rivals(seen, verdicts)])
+    return Heard(cut.kind, cut.number, cut.operation.tool.teeth, len(seen.samples) / RATE,
+                 np.array([v.window_end_ns * 1e-9 for v in verdicts]), np.zeros(0, dtype=np.int8), _states(verdicts),
+                 scores, None, cpu, math.nan, np.zeros(0, dtype=np.int8)), verdicts
+
+
+def _states(verdicts: Sequence[Verdict]) -> NDArray[np.int8]:
+    return np.array([int(v.state) for v in verdicts], dtype=np.int8)
+
+
+def hear_cut(kind: str, number: int, tachometer: bool = False, prior: bool = False) -> Heard:
+    """One simulated cut; tachometer, prior: also with a tachometer 1 % wrong, with a prior from a wrong model."""
+    motion = simulate_cut(make_cut(kind, number))
+    cut, config = motion.cut, config_from_operation(motion.cut.operation)
+    seen = observe(motion)
+    heard, verdicts = _heard(cut, seen, config)
+    truth = np.array([NO_TRUTH if k is None else int(k) for k in true_kinds(cut, seen, verdicts)], dtype=np.int8)
+    heard = replace(heard, truth=truth, episode=episode(cut, seen))
+    if tachometer:
+        sign = 1 if number % 2 else -1
+        other = _states(listen(config, observe(motion, sign * TACHOMETER_ERROR)))
+        heard = replace(heard, changed=float(np.sum(other != heard.state)))
+    if prior:
+        heard = replace(heard, with_prior=_states(listen(config, seen, wrong_prior(cut))))
+    return heard
+
+
+def hear_quiet(kind: str, number: int, part: int, motion: Motion | None = None) -> Heard:
+    """A minute without chatter; motion: of the cut that goes on (None: made again)."""
+    motion = quiet_motion(kind, number) if motion is None else motion
+    seen = go_on(motion, kind, number, part)
+    heard, verdicts = _heard(motion.cut, seen, config_from_operation(motion.cut.operation))
+    true = ChatterKind.AIR if kind == "air" else ChatterKind.STABLE
+    return replace(heard, kind=kind, truth=np.full(len(verdicts), int(true), dtype=np.int8))
