@@ -30,7 +30,8 @@ def test_counterparts_of_a_live_run() -> None:
     found = matches(live_specs("text", "bag.mcap"))
     assert "sensor_blocks=3" in found["process_simulator"]
     assert {"joint_states=5", "operation=1"} <= found["controller"]
-    assert {"chatter_state=2", "stability_margin=1", "sensor_blocks=1"} <= found["chatter_monitor"]
+    assert {"chatter_state=3", "stability_margin=1", "sensor_blocks=1"} <= found["chatter_monitor"]
+    assert found["planner"] == {"operation=1", "stability_margin=1", "chatter_state=1", "plan_suggestion=1"}
     assert found["operation_server"] == set()
 
 

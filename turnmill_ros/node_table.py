@@ -18,6 +18,7 @@ from turnmill_ros.topics import (
     JOINT_STATES,
     OPERATION,
     OUTPUTS,
+    PLAN_SUGGESTION,
     PLOTS,
     SENSOR_BLOCKS,
     STABILITY_LOBES,
@@ -72,6 +73,8 @@ KINDS = {kind.name: kind for kind in (
              (STABILITY_MARGIN, STABILITY_LOBES, *MARGIN_PLOTS), "predicts how far the present cut is from chatter"),
     NodeKind("chatter_monitor", "consumer", (OPERATION, JOINT_STATES, SENSOR_BLOCKS, STABILITY_MARGIN),
              (CHATTER_STATE, *VERDICT_PLOTS), "judges the sensor signal: air, stable, chatter"),
+    NodeKind("planner", "consumer", (OPERATION, STABILITY_MARGIN, CHATTER_STATE), (PLAN_SUGGESTION,),
+             "suggests a more productive or a stable cut when asked, in a process of its own"),
     NodeKind("recorder", "recorder", (*INPUTS, *(t for t in OUTPUTS if t is not DIAGNOSTICS)), (),
              "records every topic of the table"),
 )}
@@ -139,7 +142,7 @@ def live_specs(
         "operation_server": {"operation_text": operation_text},
         "controller": {"duration": float(duration)},
         "process_simulator": {"seed": seed, "sample_rate": round(sample_rate), "channels": list(CHANNELS[:channels])},
-        "force_predictor": {}, "stability_monitor": {}, "chatter_monitor": {},
+        "force_predictor": {}, "stability_monitor": {}, "chatter_monitor": {}, "planner": {},
     }
     if bag is not None:
         chosen["recorder"] = {"bag": bag}

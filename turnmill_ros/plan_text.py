@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import yaml
 
@@ -11,6 +12,8 @@ from turnmill_core.operation_file import parse_operation
 from turnmill_core.process.limits import LimitMargin
 from turnmill_core.process.plan import Choice
 from turnmill_core.process.region import Conflict
+from turnmill_core.process.robust import Observation
+from turnmill_core.process.suggestion import Suggestion
 
 RPM = 60 / (2 * math.pi)
 
@@ -45,6 +48,36 @@ def conflict_text(found: Conflict) -> str:
     where = f"at best, {found.tool_speed * RPM:.0f} rpm and {found.depth * 1e3:.3g} mm: "
     joint = "" if len(found.limits) == 1 else f"{' and '.join(found.limits)} are not met together; "
     return joint + where + ", ".join(parts)
+
+
+def observation_text(seen: Observation) -> str:
+    """One observation: "measured: chatter at 775.4 Hz (tool 3025 rpm, workpiece 6 rpm, 4 mm)"."""
+    heard = f" at {seen.frequency:.1f} Hz" if math.isfinite(seen.frequency) else ""
+    turning = f", workpiece {abs(seen.workpiece_speed) * RPM:.4g} rpm" if seen.workpiece_speed else ""
+    return (f"measured: {'chatter' + heard if seen.chatter else 'no chatter'} (tool {seen.tool_speed * RPM:.0f} rpm"
+            f"{turning}, {seen.depth * 1e3:.4g} mm)")
+
+
+def suggestion_reasons(found: Suggestion, observations: Sequence[Observation]) -> list[str]:
+    """Why a suggestion is what it is: what was measured, what the model makes of it, what binds."""
+    reasons, draws = [observation_text(seen) for seen in observations], found.draws
+    if observations and not draws.operations:
+        reasons.append(f"no model within {draws.widened:g} times the usual uncertainty shows what was measured "
+                       f"({draws.drawn} drawn): measure the modes anew")
+    elif observations:
+        reasons.append(f"{len(draws.operations)} of {draws.drawn} models drawn show what was measured"
+                       + (f", with {draws.widened:g} times the usual uncertainty" if draws.widened > 1 else ""))
+    if found.choice is None:
+        reasons += [conflict_text(c) for c in found.conflicts[:3]]
+        if found.made.best is not None and draws.operations:
+            reasons.append("no cut stays feasible in enough of these models")
+        return reasons
+    change = found.choice.rate / found.present_rate - 1 if found.present_rate else math.nan
+    if math.isfinite(change):
+        reasons.append(
+            f"removal rate {found.choice.rate * 6e10:.0f} mm3/min, {change * 100:+.0f} % beside the present cut")
+    reasons += [margin_text(m) for m in sorted(found.choice.margins, key=lambda m: float(m.margin))[:3]]
+    return reasons
 
 
 def planned_text(op: Operation, choice: Choice, note: str) -> str:

@@ -76,6 +76,9 @@ STABILITY_MARGIN = Topic(
 STABILITY_LOBES = Topic(
     "stability_lobes", "turnmill_msgs/msg/StabilityLobes", "output", 1, 0.0,
     "stability diagram at the present workpiece speed", durability="transient_local")
+PLAN_SUGGESTION = Topic(
+    "plan_suggestion", "turnmill_msgs/msg/PlanSuggestion", "output", 1, 0.0,
+    "suggested cut with its reasons, after a request to the planner", durability="transient_local")
 DIAGNOSTICS = Topic(
     "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "output", 100, 1.0,
     "state of each node: blocks received, index gaps, time since the last input, disk")
@@ -103,7 +106,7 @@ PLOTS = (
 
 TOPICS = (
     JOINT_STATES, SENSOR_BLOCKS, OPERATION, CUTTING_LOADS, WRENCH_TOOL, WRENCH_MACHINE, WRENCH_MEASURED,
-    FORCE_SCALE, CHATTER_STATE, STABILITY_MARGIN, STABILITY_LOBES, *PLOTS, DIAGNOSTICS, CLOCK,
+    FORCE_SCALE, CHATTER_STATE, STABILITY_MARGIN, STABILITY_LOBES, PLAN_SUGGESTION, *PLOTS, DIAGNOSTICS, CLOCK,
 )
 INPUTS = tuple(topic for topic in TOPICS if topic.direction == "input")
 OUTPUTS = tuple(topic for topic in TOPICS if topic.direction == "output")

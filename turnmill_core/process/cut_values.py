@@ -47,6 +47,11 @@ def with_feed(op: Operation, feed: float) -> Operation:
     return replace(op, axial_feed=feed, conditions=replace(nominal, feed_speed=speed, cross_feed_span=span))
 
 
+def flexible(op: Operation) -> bool:
+    """Whether tool or workpiece can vibrate, so that stability is a limit."""
+    return op.tool.structure.flexible or op.workpiece.structure.flexible or op.workpiece.beam is not None
+
+
 def feed_of(op: Operation) -> float:
     """Axial feed [m/rev] in turn-milling, feed per tooth [m] in milling."""
     return op.feed_per_tooth if op.process == "milling" else op.axial_feed
@@ -75,7 +80,7 @@ def cut_values(op: Operation, conditions: Conditions) -> CutValues:
     """Values of one cut, each from its own full model. Raises ValueError as the models do."""
     values = dict(zip(LOADS, _load_values(op, cutting_loads(op, conditions)), strict=True))
     lower, upper = math.nan, math.nan
-    if op.tool.structure.modes or op.workpiece.structure.modes:
+    if flexible(op):
         deepest = searched_depth(op, conditions.depth)
         found = stability_margin(op, conditions, depth_search=deepest, speed_search=False)
         ends = nearest_stable(found.stable_depths, np.asarray(conditions.depth), deepest)
@@ -97,7 +102,9 @@ def form_errors(op: Operation, depths: Floats, tool_speeds: Floats, workpiece_sp
     """
     if op.process == "milling":
         return np.full((depths.size, tool_speeds.size), math.nan)
-    axial = any(m.shape[2] != 0 for m in (*op.tool.structure.modes, *op.workpiece.structure.modes))
+    axial = flexible(op) and not all(
+        s.modes and not any((s.heights, s.cross_modes, s.table, *(m.shape[2] for m in s.modes)))
+        for s in (op.tool.structure, op.workpiece.structure) if s.flexible or op.workpiece.beam)
     columns, rows = (np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int))
                      for n, most in ((tool_speeds.size, 48 if axial else 16), (depths.size, 8)))
     coarse = np.array([[form_error(op, with_cut(op, float(tool_speeds[j]), workpiece_speed, float(depths[i]))).total
@@ -164,7 +171,7 @@ def grid_values(
     depths = table.depths[:, None] + 0 * tool_speeds
     speeds = tool_speeds + 0 * depths
     lower, upper = np.full(depths.shape, np.nan), np.full(depths.shape, np.nan)
-    if op.tool.structure.modes or op.workpiece.structure.modes:
+    if flexible(op):
         deepest = searched_depth(op, float(table.depths[-1]))
         found = stability_boundary(
             op, tool_speeds, deepest, workpiece_speed, scan=scan,

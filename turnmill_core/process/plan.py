@@ -195,9 +195,9 @@ def choose(found: Region, depth_limit: Floats | None = None) -> Choice | None:
 
 
 def _reserves(found: Region, column: int, depth: float) -> tuple[float, ...]:
-    """Margins at a depth [m] and a tool speed, the smallest first; hundredths count."""
+    """Margins at a depth [m] and a tool speed, the smallest first, hundredths count; then nearness to the nominal."""
     at = [float(np.interp(depth, found.depths, m[:, column])) for m in found.stacked]
-    return tuple(sorted(round(m, 2) for m in at))
+    return (*sorted(round(m, 2) for m in at), -abs(float(found.tool_speeds[column]) - found.op.conditions.tool_speed))
 
 
 def _checked(found: Region, tool_speed: float, depth: float) -> Choice | None:

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Operation, require
-from turnmill_core.prediction import PredictedType
 from turnmill_core.process.cut_values import cut_values, feed_of, load_table, with_feed
 from turnmill_core.process.limits import limit_margins
 from turnmill_core.process.plan import Choice, Plan, Tell, choose
 from turnmill_core.process.region import TINY, Region, region
-from turnmill_core.stability.margin import stability_point
+from turnmill_core.stability.floquet import chatter_family
+from turnmill_core.stability.operating_point import depth_family
 from turnmill_core.stability.uncertainty import Spread, sampled
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ DEPTHS = 10
 """Tool speeds and depths of a region at which the share is computed."""
 WIDENINGS = (1.0, 2.0, 4.0)
 """Spreads that are tried in turn, as multiples, until draws agree with what was observed."""
-FREQUENCY_AGREES = 0.03
+FREQUENCY_AGREES = 0.01
 """Relative difference of a predicted chatter frequency from the measured one up to which a draw agrees."""
 
 
@@ -91,14 +91,15 @@ def draw(
 
 def agrees(op: Operation, seen: Observation) -> bool:
     """Whether `op` predicts what was observed: chatter, at about its frequency where that is known, or none."""
-    point = stability_point(op, with_cut(op, seen.tool_speed, seen.workpiece_speed, seen.depth))
-    if not seen.chatter:
-        return point.predicted_type is PredictedType.STABLE
-    if point.predicted_type not in (PredictedType.HOPF, PredictedType.FLIP):
+    cut = with_cut(op, seen.tool_speed, seen.workpiece_speed, seen.depth)
+    family = depth_family(op, cut, seen.depth)
+    multiplier = complex(family.multipliers(family.series([seen.depth]))[0])
+    if (abs(multiplier) >= 1) != seen.chatter:
         return False
-    if math.isnan(seen.frequency):
+    if not seen.chatter or math.isnan(seen.frequency):
         return True
-    return bool(np.any(np.abs(point.chatter_family / seen.frequency - 1) < FREQUENCY_AGREES))
+    lines = chatter_family(multiplier, family.deepest.period, 2 * seen.frequency)
+    return bool(np.any(np.abs(lines / seen.frequency - 1) < FREQUENCY_AGREES))
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,11 @@ CHANNELS: dict[str, Channel] = {
     "force_x": Channel("force_x", "force", "N", "cutting force on the tool, x_T"),
     "force_y": Channel("force_y", "force", "N", "cutting force on the tool, y_T"),
     "force_z": Channel("force_z", "force", "N", "cutting force on the tool, z_T"),
+    "tool_torque": Channel("tool_torque", "torque", "N m", "tool spindle"),
+    "workpiece_torque": Channel("workpiece_torque", "torque", "N m", "workpiece spindle"),
+    **{f"{side}_velocity_{axis}": Channel(f"{side}_velocity_{axis}", "velocity", "m/s",
+                                          f"{side} at the cutting point, {axis}_T")
+       for side in ("tool", "workpiece") for axis in "xyz"},
 }
 
 

@@ -19,13 +19,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from turnmill_core.cutting.engagement import Engagement
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.controller import axis_state_at, schedule_duration
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.operation import Operation, require
 from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
-from turnmill_core.process.model import ProcessModel, knot, process_model
+from turnmill_core.process.model import ARCS, ProcessModel, general_engagement, knot, process_model
 from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
 from turnmill_core.process.truth import MARKS_PER_TURN, Truth, join_truth, truth_of_marks
 
@@ -39,11 +40,11 @@ class SimulationState:
     """Everything that the next step needs; made by `initial`, returned by `step`, never changed.
 
     steps: index of the last integration step; base_ns: stamp of step 0; knot: last axis state as the
-    integrator sees it (empty before the first); modal (M, 2), force (3,), scalars (5,), surface
-    (teeth, slices, cells, 2): see integrator.advance; rows: raw signals that the anti-alias filter still
-    needs; next_sample: the sample that they centre on; samples: measured but not yet in a block;
-    next_block: index of the block's first sample; background: last value of the noise filter; marks:
-    displacements that the truth still needs, from the mark with index `mark_count` on.
+    integrator sees it (empty before the first), arcs: its general engagement, if any; modal (M, 2),
+    force (5,), scalars (5,), surface (teeth, slices, cells, 2): see integrator.advance; rows: raw signals
+    that the anti-alias filter still needs; next_sample: the sample that they centre on; samples: measured
+    but not yet in a block; next_block: index of the block's first sample; background: last value of the
+    noise filter; marks: displacements that the truth still needs, from the mark with index `mark_count` on.
     """
 
     model: ProcessModel
@@ -51,6 +52,7 @@ class SimulationState:
     steps: int
     base_ns: int
     knot: Floats
+    arcs: Floats
     modal: Floats
     force: Floats
     scalars: Floats
@@ -90,8 +92,9 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
     surface = np.zeros((model.teeth, model.slices, model.cells * (2 if model.teeth == 1 else 1), 2))
     half = len(model.taps) // 2
     return SimulationState(
-        model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, integrator.KNOT_COLUMNS)), modal=start,
-        force=np.zeros(3), scalars=np.zeros(integrator.SCALARS), surface=surface,
+        model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, integrator.KNOT_COLUMNS)),
+        arcs=np.zeros((0, model.slices, ARCS, 2)), modal=start,
+        force=np.zeros(integrator.LOADS), scalars=np.zeros(integrator.SCALARS), surface=surface,
         rows=np.zeros((half, len(integrator.RAW))), next_sample=0,
         samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
         marks=np.zeros((0, 4)), first_mark_skip=-1,
@@ -100,8 +103,12 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
 
 def step(
     config: SimulationConfig, state: SimulationState, axes: Sequence[AxisState],
+    engagements: Sequence[Engagement] | None = None,
 ) -> tuple[SimulationState, Chunk]:
     """Integrate over the axis states `axes`, which follow those of earlier steps.
+
+    engagements: where the edges are in the cut at each axis state, in place of the closed form (in every step, or in
+    none).
 
     The first axis state of all is time 0, and the first sample is taken there. Samples come out a
     few milliseconds behind the axis states, because the anti-alias filter looks ahead; their stamps
@@ -111,7 +118,17 @@ def step(
     if not chunk:
         return state, Chunk((), (), join_truth(()))
     base_ns = state.base_ns if len(state.knot) else chunk[0].stamp_ns
-    knots = np.concatenate([state.knot, *(knot(state.model, a, base_ns)[None, :] for a in chunk)])
+    rows = [knot(state.model, a, base_ns) for a in chunk]
+    arcs: list[Floats] = []
+    if engagements is not None:
+        require(len(engagements) == len(chunk), "engagements", len(engagements), "",
+                f"one per axis state, {len(chunk)}")
+        general = [general_engagement(state.model, *pair) for pair in zip(rows, engagements, strict=True)]
+        rows, arcs = [row for row, _ in general], [found[None] for _, found in general]
+    elif state.model.op.eccentricity or len(state.arcs):
+        raise ValueError("engagements are None, expected one per axis state: the cut has no closed form here")
+    knots = np.concatenate([state.knot, np.array(rows)])
+    around = np.concatenate([state.arcs, *arcs])
     stamps = knots[:, integrator.TIME]
     if np.any(np.diff(stamps) <= 0):
         at = int(np.argmax(np.diff(stamps) <= 0))
@@ -119,17 +136,18 @@ def step(
                          "expected ascending stamps")
     if not len(state.knot):
         state = _begin(state, knots[0], base_ns)
-    return _finish_chunk(config, *_integrate(config, state, knots), chunk)
+    return _finish_chunk(config, *_integrate(config, state, knots, around), chunk)
 
 
 def simulate(
     op: Operation, config: SimulationConfig, seed: int, axes_at: Callable[[float, int], AxisState] | None = None,
-    duration: float | None = None,
+    duration: float | None = None, engagement_at: Callable[[AxisState], Engagement] | None = None,
 ) -> Iterator[Chunk]:
     """Chunks of one block each, until `duration` [s] (None: the schedule's).
 
     axes_at: axis state for a time [s] and a stamp [ns] (None: the operation's schedule, by
-    controller.axis_state_at). The last chunks carry no axis states beyond the duration.
+    controller.axis_state_at). engagement_at: where the edges cut at an axis state, called in order of time (None: the
+    closed form); see engagement_path.along_path. The last chunks carry no axis states beyond the duration.
     """
     if axes_at is None:
         def axes_at(time: float, stamp_ns: int) -> AxisState:
@@ -144,7 +162,8 @@ def simulate(
         times = [(index + i) / config.axes_rate for i in range(per_chunk)]
         index += per_chunk
         states = [axes_at(t, config.start_ns + round(t * 1e9)) for t in times]
-        state, chunk = step(config, state, states)
+        cuts = None if engagement_at is None else [engagement_at(a) for a in states]
+        state, chunk = step(config, state, states, cuts)
         kept = chunk.blocks[: blocks - made]
         made += len(kept)
         shown = tuple(a for a, t in zip(chunk.axes, times, strict=True) if t <= end + 1e-9)
@@ -168,7 +187,9 @@ def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationSta
                    first_mark_skip=-next_mark % period)
 
 
-def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) -> tuple[SimulationState, Floats]:
+def _integrate(
+    config: SimulationConfig, state: SimulationState, knots: Floats, arcs: Floats,
+) -> tuple[SimulationState, Floats]:
     """Run the kernel to the last knot; the marks that it wrote."""
     model = state.model
     dt = model.dt
@@ -184,11 +205,11 @@ def _integrate(config: SimulationConfig, state: SimulationState, knots: Floats) 
     written = 0
     if count:
         written = integrator.advance(
-            state.steps, dt, knots, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
+            state.steps, dt, knots, arcs, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
             model.coefficients, config.loss_of_contact, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
         )
-    advanced = replace(state, steps=state.steps + count, knot=knots[-1:], modal=modal, force=force, scalars=scalars,
-                       surface=surface, rows=np.concatenate([state.rows, raw]))
+    advanced = replace(state, steps=state.steps + count, knot=knots[-1:], arcs=arcs[-1:], modal=modal, force=force,
+                       scalars=scalars, surface=surface, rows=np.concatenate([state.rows, raw]))
     return advanced, marks[:written]
 
 
@@ -241,7 +262,8 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
                                                 angle, background)
             signals[:, c] += ambient
         else:
-            level = config.force_noise if name.startswith("force") else config.displacement_noise
+            level = {"force": config.force_noise, "displacement": config.displacement_noise}.get(
+                CHANNELS[name].quantity, 0.0)
             signals[:, c] += level * white_noise(state.seed, 1 + list(CHANNELS).index(name), state.next_sample, count)
     return replace(state, rows=state.rows[count * ratio :], next_sample=state.next_sample + count,
                    background=background, samples=np.concatenate([state.samples, signals.astype(np.float32)]))

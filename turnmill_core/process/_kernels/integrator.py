@@ -16,20 +16,26 @@ Floats = NDArray[np.float64]
 
 # Columns of `knots`, one row per axis state.
 TIME, TOOL_ANGLE, TOOL_SPEED, SLIP, DEPTH, FEED_X, FEED_X_SLOPE, FEED_Y = range(8)
-START, START_SLOPE, EXIT, EXIT_SLOPE = range(8, 12)
-KNOT_COLUMNS = 12
+START, START_SLOPE, EXIT, EXIT_SLOPE, LEVER = range(8, 13)
+KNOT_COLUMNS = 13
 # SLIP: relative lengthening of the delay; START, EXIT [rad] of the arc across the feed, the end of the
-# bar left out; FEED_X [m/s], START and EXIT at the tool tip and their SLOPE along the tool axis.
+# bar left out; FEED_X [m/s], START and EXIT at the tool tip and their SLOPE along the tool axis; LEVER
+# [m]: distance of the tip from the C axis, 0 in milling.
 # Columns of `modes`: exact transition of one oscillator over one step with a force linear in time.
 A11, A12, A21, A22, B1, C1, B2, C2, STIFFNESS, DAMPING, INVERSE_MASS = range(11)
 SHAPE_X, SHAPE_Y, SHAPE_Z, SIDE, RADIATION = range(11, 16)
-MODE_COLUMNS = 16
-# SIDE: +1 on the tool, -1 on the workpiece, 0 radiates only (does not move the cutting point).
+DRIVE_X, DRIVE_Y, DRIVE_Z, OF_DISPLACEMENT, OF_VELOCITY = range(16, 21)
+MODE_COLUMNS = 21
+# SIDE: +1 on the tool, -1 on the workpiece, 0 radiates only (does not move the cutting point). DRIVE: shape
+# through which the force drives the mode; OF_...: weights of q [1] and q' [s] in what moves the point (a real mode:
+# 1 and 0).
 # Columns of `raw`, one row per step.
 RAW = (
     "angle", "sound", "tool_x", "tool_y", "tool_z", "workpiece_x", "workpiece_y", "workpiece_z",
-    "force_x", "force_y", "force_z",
+    "force_x", "force_y", "force_z", "tool_torque", "workpiece_torque", "tool_velocity_x", "tool_velocity_y",
+    "tool_velocity_z", "workpiece_velocity_x", "workpiece_velocity_y", "workpiece_velocity_z",
 )
+LOADS = 5
 # Entries of `scalars`, carried from step to step.
 ANGLE, PSI, LAST_DEPTH, CHIP, NEXT_MARK = range(5)
 SCALARS = 5
@@ -98,13 +104,15 @@ def _hermite(a: float, va: float, b: float, vb: float, h: float, u: float) -> fl
 
 @njit(cache=True, error_model="numpy")
 def _cut(
-    now: Floats, turned: float, psi: float, px: float, py: float, tooth_angle: Floats, pitch: Floats, runout: Floats,
-    shape: Floats, coefficients: Floats, contact: bool, surface: Floats, place: Floats, force: Floats,
+    now: Floats, arcs: Floats, turned: float, psi: float, px: float, py: float, vx: float, vy: float,
+    tooth_angle: Floats, pitch: Floats, runout: Floats, shape: Floats, coefficients: Floats, contact: bool,
+    surface: Floats, place: Floats, force: Floats,
 ) -> float:
-    """Cutting force on the tool [N] (3,) for the displacement px, py [m]; returns the largest chip [m].
+    """Cutting force on the tool [N] and torques [N m] (5,) for displacement px, py [m]; returns the largest chip [m].
 
-    now: a row of knots at this instant; turned [rad]: tool angle of the step; psi [rad]: angle of the
-    tool in the material. place (teeth, slices, 4) receives what _leave_surface needs: sine and
+    vx, vy [m/s]: velocity of the displacement, for process damping. now: a row of knots at this instant;
+    arcs (slices, A, 2) [rad]: general engagement, see advance; turned [rad]: tool angle of the step; psi [rad]:
+    angle of the tool in the material. place (teeth, slices, 4) receives what _leave_surface needs: sine and
     cosine of the tooth's angle, middle height of the engaged part of the slice [m] (-1: no chip is
     cut), and 1 near the cut, else 0. Entry and exit of a slice are taken with its share that has passed,
     averaged with a hat of one step's width, which keeps impulse and moment of the force when an edge
@@ -124,7 +132,8 @@ def _cut(
     first = start - margin
     cos_step, sin_step = 2.0, 0.0  # found once a tooth is near the cut
     length = abs(lag_step) / turned
-    chip = fx = fy = fz = 0.0
+    chip = fx = fy = fz = torque = moment = 0.0
+    damping = coefficients[6] / now[TOOL_SPEED]
     for j in range(teeth):
         for s in range(slices):
             place[j, s, 3] = 0.0
@@ -145,14 +154,20 @@ def _cut(
                 continue
             place[j, s, 0], place[j, s, 1], place[j, s, 2], place[j, s, 3] = sin, cos, -1.0, 1.0
             low, high = depth * s / slices, depth * (s + 1) / slices
-            if bar_radius > 0.0:
+            if bar_radius > 0.0 and arcs.shape[0] == 0:
                 reach = radius * sin
                 high = min(high, math.sqrt(max(0.0, bar_radius * bar_radius - reach * reach)) - bar_radius + depth)
             if high <= low:
                 continue
             height = 0.5 * (low + high)
-            enter, go = start + height * now[START_SLOPE], leave + height * now[EXIT_SLOPE]
-            width = (high - low) * (_past((phi - enter) / turned, length) - _past((phi - go) / turned, length))
+            if arcs.shape[0] == 0:
+                enter, go = start + height * now[START_SLOPE], leave + height * now[EXIT_SLOPE]
+                width = (high - low) * (_past((phi - enter) / turned, length) - _past((phi - go) / turned, length))
+            else:
+                width = 0.0
+                for a in range(arcs.shape[1]):
+                    width += (high - low) * (_past((phi - arcs[s, a, 0]) / turned, length)
+                                             - _past((phi - arcs[s, a, 1]) / turned, length))
             if width <= 0.0:
                 continue
             place[j, s, 2] = height
@@ -165,10 +180,18 @@ def _cut(
             chip = max(chip, h)
             tangential = width * (coefficients[0] * h + coefficients[3])
             radial = width * (coefficients[1] * h + coefficients[4])
+            axial = width * (coefficients[2] * h + coefficients[5])
+            if damping > 0.0:
+                pressed = width * damping * (vx * sin + vy * cos)
+                radial += pressed
+                tangential += coefficients[7] * pressed
             fx -= radial * sin + tangential * cos
             fy -= radial * cos - tangential * sin
-            fz -= width * (coefficients[2] * h + coefficients[5])
-    force[0], force[1], force[2] = fx, fy, fz
+            fz -= axial
+            torque += radius * tangential
+            if now[LEVER] > 0.0:
+                moment += (now[LEVER] + height) * (radial * sin + tangential * cos) - radius * sin * axial
+    force[0], force[1], force[2], force[3], force[4] = fx, fy, fz, torque, moment
     return chip
 
 
@@ -226,32 +249,40 @@ def _leave_surface(
 
 
 @njit(cache=True, error_model="numpy")
-def _move(modes: Floats, modal: Floats, motion: Floats) -> None:
-    """Relative displacement and velocity (4,) of the tool against the workpiece from the modal state."""
+def _move(modes: Floats, modal: Floats, force: Floats, motion: Floats) -> None:
+    """Relative displacement and velocity (4,) of the tool against the workpiece from the modal state and the force."""
     x = y = vx = vy = 0.0
     for m in range(modes.shape[0]):
         if modes[m, SIDE] != 0.0:
-            x += modes[m, SHAPE_X] * modal[m, 0]
-            y += modes[m, SHAPE_Y] * modal[m, 0]
-            vx += modes[m, SHAPE_X] * modal[m, 1]
-            vy += modes[m, SHAPE_Y] * modal[m, 1]
+            moved, velocity = modal[m, 0], modal[m, 1]
+            if modes[m, OF_VELOCITY] != 0.0:
+                load = modes[m, DRIVE_X] * force[0] + modes[m, DRIVE_Y] * force[1] + modes[m, DRIVE_Z] * force[2]
+                rate = modes[m, INVERSE_MASS] * (load - modes[m, STIFFNESS] * moved - modes[m, DAMPING] * velocity)
+                moved = modes[m, OF_DISPLACEMENT] * moved + modes[m, OF_VELOCITY] * velocity
+                velocity = modes[m, OF_DISPLACEMENT] * velocity + modes[m, OF_VELOCITY] * rate
+            x += modes[m, SHAPE_X] * moved
+            y += modes[m, SHAPE_Y] * moved
+            vx += modes[m, SHAPE_X] * velocity
+            vy += modes[m, SHAPE_Y] * velocity
     motion[0], motion[1], motion[2], motion[3] = x, y, vx, vy
 
 
 @njit(cache=True, error_model="numpy")
 def advance(
-    first: int, dt: float, knots: Floats, modes: Floats, tooth_angle: Floats, pitch: Floats, runout: Floats,
-    shape: Floats, coefficients: Floats, contact: bool, modal: Floats, force: Floats, scalars: Floats,
-    surface: Floats, raw: Floats, marks_per_turn: int, marks: Floats,
+    first: int, dt: float, knots: Floats, arcs: Floats, modes: Floats, tooth_angle: Floats, pitch: Floats,
+    runout: Floats, shape: Floats, coefficients: Floats, contact: bool, modal: Floats, force: Floats,
+    scalars: Floats, surface: Floats, raw: Floats, marks_per_turn: int, marks: Floats,
 ) -> int:
     """Integrate the cut over len(raw) steps of `dt`, from step index `first`; returns the marks written.
 
-    knots (K, 12): axis states, times ascending; modes (M, 16); tooth_angle, pitch [rad], runout [m]
-    (teeth,); shape (4,): radius of tool and bar [m] (bar 0: a block), helix lag per height [rad/m], longest pitch;
-    coefficients (6,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m]; contact: the tool can leave the material.
-    Updated in place: modal (M, 2) displacement and velocity, force (3,) on the tool, scalars (5,),
-    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 11), see RAW; marks
-    (n, 4): time, relative displacement x, y, and largest chip since the last mark, at every
+    knots (K, 13): axis states, times ascending; arcs (K, slices, A, 2) [rad]: start and exit of the arcs in which each
+    slice of the edge cuts at each knot, in place of the closed form (no rows: the closed form); modes (M, 21);
+    tooth_angle, pitch [rad], runout [m] (teeth,); shape (4,): radius of tool and bar [m] (bar 0: a block), helix lag
+    per height [rad/m], longest pitch; coefficients (8,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m], process damping per
+    height times the tool's speed [N/m2] and its friction [1]; contact: the tool can leave the material.
+    Updated in place: modal (M, 2) displacement and velocity, force (5,) on the tool and torques, scalars (5,),
+    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 19), see RAW;
+    marks (n, 4): time, relative displacement x, y, and largest chip since the last mark, at every
     2 pi / marks_per_turn of the tool angle.
     """
     mark_angle = 2.0 * math.pi / marks_per_turn
@@ -259,7 +290,8 @@ def advance(
     free = np.empty((modes.shape[0], 2))
     motion = np.empty((2, 4))
     place = np.zeros((surface.shape[0], surface.shape[1], 4))
-    _move(modes, modal, motion[1])
+    around = np.zeros((arcs.shape[1] if arcs.shape[0] > 0 else 0, arcs.shape[2], 2))
+    _move(modes, modal, force, motion[1])
     written = 0
     k = 0
     for i in range(raw.shape[0]):
@@ -270,6 +302,10 @@ def advance(
         u = (time - knots[k, TIME]) / span
         for c in range(knots.shape[1]):
             now[c] = (1.0 - u) * knots[k, c] + u * knots[k + 1, c]
+        for s in range(around.shape[0]):
+            for c in range(around.shape[1]):
+                for e in range(2):
+                    around[s, c, e] = (1.0 - u) * arcs[k, s, c, e] + u * arcs[k + 1, s, c, e]
         now[TOOL_ANGLE] = _hermite(knots[k, TOOL_ANGLE], knots[k, TOOL_SPEED], knots[k + 1, TOOL_ANGLE],
                                    knots[k + 1, TOOL_SPEED], span, u)
         turned = now[TOOL_ANGLE] - scalars[ANGLE]
@@ -279,41 +315,53 @@ def advance(
 
         # The step without the force's change, and the displacement at its end with the force held:
         # the chip is then right to third order in dt.
-        px = py = 0.0
+        px = py = vx = vy = 0.0
         for m in range(modes.shape[0]):
-            load = modes[m, SHAPE_X] * force[0] + modes[m, SHAPE_Y] * force[1] + modes[m, SHAPE_Z] * force[2]
+            load = modes[m, DRIVE_X] * force[0] + modes[m, DRIVE_Y] * force[1] + modes[m, DRIVE_Z] * force[2]
             free[m, 0] = modes[m, A11] * modal[m, 0] + modes[m, A12] * modal[m, 1] + modes[m, B1] * load
             free[m, 1] = modes[m, A21] * modal[m, 0] + modes[m, A22] * modal[m, 1] + modes[m, B2] * load
             if modes[m, SIDE] != 0.0:
-                px += modes[m, SHAPE_X] * (free[m, 0] + modes[m, C1] * load)
-                py += modes[m, SHAPE_Y] * (free[m, 0] + modes[m, C1] * load)
+                moved, velocity = free[m, 0] + modes[m, C1] * load, free[m, 1] + modes[m, C2] * load
+                if modes[m, OF_VELOCITY] != 0.0:
+                    rate = modes[m, INVERSE_MASS] * (load - modes[m, STIFFNESS] * moved - modes[m, DAMPING] * velocity)
+                    moved = modes[m, OF_DISPLACEMENT] * moved + modes[m, OF_VELOCITY] * velocity
+                    velocity = modes[m, OF_DISPLACEMENT] * velocity + modes[m, OF_VELOCITY] * rate
+                px += modes[m, SHAPE_X] * moved
+                py += modes[m, SHAPE_Y] * moved
+                vx += modes[m, SHAPE_X] * velocity
+                vy += modes[m, SHAPE_Y] * velocity
         chip = 0.0
-        force[0] = force[1] = force[2] = 0.0
+        for c in range(LOADS):
+            force[c] = 0.0
         if turning:
-            chip = _cut(now, turned, psi1, px, py, tooth_angle, pitch, runout, shape, coefficients, contact, surface,
-                        place, force)
+            chip = _cut(now, around, turned, psi1, px, py, vx, vy, tooth_angle, pitch, runout, shape, coefficients,
+                        contact, surface, place, force)
 
         # The modes at the end of the step, the force linear over it.
-        for c in range(1, 8):
+        for c in range(1, raw.shape[1]):
             raw[i, c] = 0.0
         for m in range(modes.shape[0]):
-            load = modes[m, SHAPE_X] * force[0] + modes[m, SHAPE_Y] * force[1] + modes[m, SHAPE_Z] * force[2]
+            load = modes[m, DRIVE_X] * force[0] + modes[m, DRIVE_Y] * force[1] + modes[m, DRIVE_Z] * force[2]
             q = free[m, 0] + modes[m, C1] * load
             v = free[m, 1] + modes[m, C2] * load
             modal[m, 0], modal[m, 1] = q, v
-            raw[i, 1] += modes[m, RADIATION] * modes[m, INVERSE_MASS] * (
-                load - modes[m, STIFFNESS] * q - modes[m, DAMPING] * v)
+            rate = modes[m, INVERSE_MASS] * (load - modes[m, STIFFNESS] * q - modes[m, DAMPING] * v)
+            raw[i, 1] += modes[m, RADIATION] * rate
             side = modes[m, SIDE]
             if side != 0.0:
-                column = 2 if side > 0.0 else 5
-                raw[i, column] += side * modes[m, SHAPE_X] * q
-                raw[i, column + 1] += side * modes[m, SHAPE_Y] * q
-                raw[i, column + 2] += side * modes[m, SHAPE_Z] * q
+                column, velocity_column = (2, 13) if side > 0.0 else (5, 16)
+                if modes[m, OF_VELOCITY] != 0.0:
+                    q, v = (modes[m, OF_DISPLACEMENT] * q + modes[m, OF_VELOCITY] * v,
+                            modes[m, OF_DISPLACEMENT] * v + modes[m, OF_VELOCITY] * rate)
+                for c in range(3):
+                    raw[i, column + c] += side * modes[m, SHAPE_X + c] * q
+                    raw[i, velocity_column + c] += side * modes[m, SHAPE_X + c] * v
         raw[i, 0] = now[TOOL_ANGLE]
-        raw[i, 8], raw[i, 9], raw[i, 10] = force[0], force[1], force[2]
+        for c in range(LOADS):
+            raw[i, 8 + c] = force[c]
         for c in range(4):
             motion[0, c] = motion[1, c]
-        _move(modes, modal, motion[1])
+        _move(modes, modal, force, motion[1])
         if turning:
             _leave_surface(now, turned, dt, psi0, psi1, scalars[LAST_DEPTH], motion, tooth_angle, pitch, runout,
                            shape[2], contact, place, surface)
