@@ -27,6 +27,8 @@ sqrt(m_u m_v) as a force, which does no work where the modal masses differ."""
 Damping = Literal["tool", "machine"]
 """Where the damping of a turning structure is fixed: in what turns (no circulatory term K_crc), or in the machine
 (K_crc stands)."""
+CrossPlane = Literal["xy", "yz", "xz", "-xy", "-yz", "-xz"]
+CROSS_PLANES: tuple[CrossPlane, ...] = ("xy", "yz", "xz", "-xy", "-yz", "-xz")
 CROSS_READINGS: tuple[CrossReading, ...] = ("none", "symmetric", "rank-one")
 TABLE_AXES = ("x", "y", "z", "b", "tool_speed")
 """What modes may depend on: axis positions [m, rad] and the tool spindle's speed [rad/s]."""
@@ -76,22 +78,22 @@ class CrossMode:
     """A measured mode of the cross receptance between two directions, without a direct mode of its own.
 
     frequency [Hz], damping [1], mass [kg]: of the fitted receptance 1/(m (w_n^2 - w^2 + 2 i zeta w_n w));
-    plane: the two directions, "xy", "yz" or "xz".
+    plane: the two directions, "xy", "yz" or "xz", with a minus where the receptance is the negative of that.
     """
 
     frequency: float
     damping: float
     mass: float
-    plane: Literal["xy", "yz", "xz"]
+    plane: CrossPlane
 
     def __post_init__(self) -> None:
         self.shared()
-        require(self.plane in ("xy", "yz", "xz"), "cross mode plane", self.plane, "", "xy, yz or xz")
+        require(self.plane in CROSS_PLANES, "cross mode plane", self.plane, "", f"one of {', '.join(CROSS_PLANES)}")
 
     def directions(self) -> tuple[Vector, Vector]:
-        """Unit vectors of the two directions."""
-        first, second = ((float(axis == "x"), float(axis == "y"), float(axis == "z")) for axis in self.plane)
-        return first, second
+        """Unit vectors of the two directions, the second one reversed with a minus."""
+        first, second = ((float(axis == "x"), float(axis == "y"), float(axis == "z")) for axis in self.plane[-2:])
+        return first, (-second[0], -second[1], -second[2]) if self.plane[0] == "-" else second
 
     def shared(self) -> Mode:
         """The rank-one reading: one mode that moves both directions equally."""

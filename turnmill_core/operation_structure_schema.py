@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from .operation_structure import (
+    CROSS_PLANES,
     Beam,
     BeamMaterial,
     Chuck,
@@ -39,14 +40,13 @@ from .operation_units import (
 )
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "u": (1.0, 0.0, 0.0), "v": (0.0, 1.0, 0.0)}
-_CROSS = ("xy", "yz", "xz")
 _Vector = tuple[Number, Number, Number]
 
 
 class ModeSection(Section):
     """One vibration mode at the cutting point: direction (a direct or a cross mode), shape or shapes."""
 
-    direction: Literal["x", "y", "z", "u", "v", "xy", "yz", "xz"] | None = Field(
+    direction: Literal["x", "y", "z", "u", "v", "xy", "yz", "xz", "-xy", "-yz", "-xz"] | None = Field(
         None, description="direct mode along this axis of the frame, or a cross mode between two")
     shape: _Vector | None = Field(
         None, description="mode shape (x, y, z) at the cutting point, numbers without unit, for the modal mass given")
@@ -68,7 +68,7 @@ class ModeSection(Section):
             raise PydanticCustomError("cross", "a mode shape that is not all zero")
         if self.damping >= 1:
             raise PydanticCustomError("cross", "a damping ratio below 100 %")
-        if self.direction in _CROSS and (self.torsion or self.phase):
+        if self.direction in CROSS_PLANES and (self.torsion or self.phase):
             raise PydanticCustomError("cross", "a cross mode without torsion and phase")
         return self
 
@@ -118,10 +118,10 @@ class StructureSection(Section):
         every = (*self.modes, *(m for entry in self.table for m in entry.modes))
         if any((m.direction in ("u", "v")) != turning for m in every):
             raise PydanticCustomError("cross", "directions u and v in the rotating frame, and only there")
-        cross = any(m.direction in _CROSS for m in self.modes)
+        cross = any(m.direction in CROSS_PLANES for m in self.modes)
         if cross != (self.cross_modes is not None):
             raise PydanticCustomError("cross", "cross_modes (none, symmetric, rank-one) where modes are in xy, yz, xz")
-        if any(m.direction in _CROSS for entry in self.table for m in entry.modes):
+        if any(m.direction in CROSS_PLANES for entry in self.table for m in entry.modes):
             raise PydanticCustomError("cross", "modes with direction x, y, z, shape or shapes in a table")
         if len({frozenset(entry.at.model_dump(exclude_none=True)) for entry in self.table}) > 1:
             raise PydanticCustomError("cross", "the same axes in every place of the table")
@@ -134,9 +134,9 @@ class StructureSection(Section):
             places = [entry.at.model_dump(exclude_none=True) for entry in self.table]
             table = ModeTable(tuple(places[0]), tuple(tuple(p.values()) for p in places),
                               tuple(tuple(m.value() for m in entry.modes) for entry in self.table))
-        cross = tuple(CrossMode(m.frequency, m.damping, m.mass, m.direction) for m in self.modes
-                      if m.direction in ("xy", "yz", "xz"))
-        modes = table.modes[0] if table else tuple(m.value() for m in self.modes if m.direction not in _CROSS)
+        cross = tuple(CrossMode(m.frequency, m.damping, m.mass, plane) for m in self.modes for plane in CROSS_PLANES
+                      if m.direction == plane)
+        modes = table.modes[0] if table else tuple(m.value() for m in self.modes if m.direction not in CROSS_PLANES)
         return Structure(modes, self.frame, self.heights, cross, self.cross_modes or "none", self.coriolis,
                          self.turning_damping, table)
 

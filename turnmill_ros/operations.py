@@ -58,3 +58,16 @@ def with_material(operation: Operation, material: dict[str, str], source: str) -
     document["sources"] = f"{document.get('sources', '').rstrip()}\n{source}\n".lstrip()
     return parse_operation(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100),
                            f"{operation.name} with other material")
+
+
+def with_structure(operation: Operation, holder: str, section: dict[str, Any], source: str) -> Operation:
+    """The operation with another structure section of `holder`, tool or workpiece; `source` is added to its sources.
+
+    Raises OperationError where the section is not one.
+    """
+    document: dict[str, Any] = yaml.safe_load(operation.text)
+    document[holder].pop("beam", None)
+    document[holder]["structure"] = section
+    document["sources"] = f"{document.get('sources', '').rstrip()}\n{source}\n".lstrip()
+    return parse_operation(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100),
+                           f"{operation.name} with other modes")
