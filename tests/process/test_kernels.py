@@ -35,10 +35,10 @@ def test_the_compiled_integrator_is_the_plain_one(name: str, monkeypatch: pytest
         count = 320
         modal = np.zeros((len(model.modes), 2))
         modal[:, 0] = 1e-5
-        state = [modal, np.zeros(3), np.array([0.0, 0.0, knots[0, integrator.DEPTH], 0.0, 1.0]),
+        state = [modal, np.zeros(integrator.LOADS), np.array([0.0, 0.0, knots[0, integrator.DEPTH], 0.0, 1.0]),
                  np.zeros((model.teeth, model.slices, model.cells, 2)), np.empty((count, len(integrator.RAW)))]
         marks = np.zeros((2000, 4))
-        written = function(0, model.dt, knots, model.modes, model.tooth_angle, model.pitch,  # type: ignore[operator]
+        written = function(0, model.dt, knots, np.zeros((0, 0, 0, 2)), model.modes, model.tooth_angle, model.pitch,  # type: ignore[operator]
                            model.runout, model.shape, model.coefficients, True, *state, 240, marks)
         assert written > 0
         return [*state, marks]

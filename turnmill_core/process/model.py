@@ -183,7 +183,7 @@ def _modes(op: Operation, sound: SoundModel, dt: float) -> Floats:
     """Rows of integrator.advance's modes: tool, workpiece, then the panels that only radiate."""
     rotation = machine_from_tool(op, op.conditions)
     direction = np.array(sound.direction)
-    rows = []
+    rows: list[Floats] = []
     structures = plain_structures(op, rotation, op.conditions)
     phases = checked_phases(contact_modes(*structures, rotation).modes).phase
     for structure, side, area in zip(structures, (1.0, -1.0), (sound.tool_area, sound.workpiece_area), strict=True):
