@@ -141,24 +141,6 @@ def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], t
     return plot
 
 
-def forces(
-    angle: NDArray[np.float64], force: NDArray[np.float64], torque: NDArray[np.float64]
-) -> tuple[figure, figure]:
-    """Forces on the tool (n, 3) [N], tool frame, and tool torque (n,) [N m] over one revolution (angle [rad])."""
-    degrees = np.degrees(angle)
-    plot = new_figure(
-        "Predicted forces on the tool over one revolution (tool frame)", "tool rotation [deg]", "force [N]", 300
-    )
-    for k, name in enumerate(("x feed", "y cross feed", "z tool axis")):
-        plot.line(degrees, force[:, k], color=LINE_COLOURS[k], line_width=2, legend_label=name,
-                  line_dash=("solid", "dashed", "dotdash")[k])
-    legend_right(plot)
-    second = new_figure("Predicted torque on the tool spindle", "tool rotation [deg]", "torque [N m]", 220,
-                     x_range=plot.x_range)
-    second.line(degrees, torque, color=LINE_COLOURS[0], line_width=2)
-    return plot, second
-
-
 def lines_over_time(title: str, unit: str, time: Sequence[float], named: dict[str, Sequence[float]],
                     x_range: Range1d | None = None) -> figure:
     """Named values over time [s]."""

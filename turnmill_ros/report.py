@@ -13,16 +13,14 @@ from bokeh.embed import components
 from bokeh.models import Range1d
 from bokeh.resources import INLINE
 
-from turnmill_core.cutting.loads import CuttingLoads
 from turnmill_core.monitoring.verdict import ChatterKind
-from turnmill_core.operation import Conditions, Operation
+from turnmill_core.operation import Operation
 from turnmill_core.operation_file import describe
 from turnmill_ros import figures
 from turnmill_ros.analysis import CHATTER, Analysis, Segment, iso_time, summary, timeline
 from turnmill_ros.predictions import Predictions
 from turnmill_ros.signals import spectrogram, stretch
 
-RPM = 60 / (2 * math.pi)
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222 }
 h1 { font-size: 1.6em; margin-bottom: 0.1em } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc }
@@ -64,16 +62,6 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
         f"judged channel {escape(channel or 'none')}</p>",
         f"<p><b>{escape(text)}</b></p>", _timeline_table(analysis), _summary_table(analysis),
     ], plots, [operation_tables(analysis.operation)])
-
-
-def forces_report(output: Path, op: Operation, cut: Conditions, loads: CuttingLoads) -> None:
-    """Write the picture of forces and torque over one tool revolution."""
-    plots = [("", p) for p in figures.forces(loads.angle, loads.force_tool, loads.tool_torque)]
-    write_page(output, f"turnmill forces: {op.name}", [
-        f"<h1>{escape(op.name)}</h1>",
-        f"<p class=note>tool {cut.tool_speed * RPM:g} rpm, workpiece {cut.workpiece_speed * RPM:g} rpm, "
-        f"depth {cut.depth * 1e3:g} mm</p>",
-    ], plots, [operation_tables(op)])
 
 
 def _named(channel: Any) -> str:

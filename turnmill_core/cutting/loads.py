@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from turnmill_core.cutting.bottom import bottom_loads
 from turnmill_core.cutting.chip import ChipModel, Cut, prepare_cut
-from turnmill_core.cutting.engagement import Engagement, Removal, bottom_rate, engagement, removal_rate
+from turnmill_core.cutting.engagement import Engagement, Removal, bottom_rate, removal_rate
 from turnmill_core.cutting.engagement_map import EngagementMap
 from turnmill_core.cutting.forces import revolve
 from turnmill_core.cutting.steady import steady_map
@@ -90,7 +90,7 @@ def cutting_loads(
     if not _has_closed_form(op, bottom):
         return path_loads(op, steady_map(op, conditions, elements), angles, chip, bottom)
     cut = prepare_cut(op, conditions, elements) if conditions.in_cut else None
-    arcs = cut.engagement if cut else engagement(op, conditions, np.zeros(1))
+    arcs = cut.engagement if cut else Engagement(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 2)))
     turns = []
     if cut and arcs.angle.any():
         turns.append(_turn(op, cut, angles, chip))
