@@ -57,11 +57,14 @@ class Analysis:
         return (stamp_ns - self.start_ns) * 1e-9
 
 
-def trusted(path: Path) -> tuple[Finding, ...]:
-    """Warnings and notes on a recording; raises InputError at the first error, which leaves no verdict to trust."""
+def trusted(path: Path, allowed: Sequence[str] = ()) -> tuple[Finding, ...]:
+    """Warnings and notes on a recording; raises InputError at the first error, which leaves no verdict to trust.
+
+    allowed: codes of errors that do not matter to the caller.
+    """
     findings = check_bag(path)
     for finding in findings:
-        if finding.severity == "error":
+        if finding.severity == "error" and finding.code not in allowed:
             when = "" if finding.time_s is None else f" at {finding.time_s:.3f} s"
             raise InputError(f"{finding.text}{when}", file=path, key=finding.topic or None)
     return tuple(findings)
