@@ -25,8 +25,8 @@ from turnmill_core.stability.margin import stability_margin
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
-RATIOS = 7
-"""Speed ratios of a load table."""
+RATIOS, RUNOUT_RATIOS = 7, 25
+"""Speed ratios of a load table, without and with runout."""
 LOADS = ("chip_thickness", "tool_torque", "tool_torque_mean", "workpiece_torque", "workpiece_torque_mean",
          "tool_force", "feed_force")
 
@@ -81,7 +81,7 @@ def cut_values(op: Operation, conditions: Conditions) -> CutValues:
     values = dict(zip(LOADS, _load_values(op, cutting_loads(op, conditions)), strict=True))
     lower, upper = math.nan, math.nan
     if flexible(op):
-        deepest = searched_depth(op, conditions.depth)
+        deepest = searched_depth(op, conditions.depth, ahead=2.0)
         found = stability_margin(op, conditions, depth_search=deepest, speed_search=False)
         ends = nearest_stable(found.stable_depths, np.asarray(conditions.depth), deepest)
         lower, upper = float(ends[0]), float(ends[1])
@@ -114,9 +114,12 @@ def form_errors(op: Operation, depths: Floats, tool_speeds: Floats, workpiece_sp
     return np.array([np.interp(depths, depths[rows], column) for column in across.T]).T
 
 
-def searched_depth(op: Operation, deepest: float) -> float:
-    """How deep [m] stability is searched for cuts down to `deepest` [m]: so far that the reserve can be told."""
-    wanted = 1.02 * deepest / (1 - op.limits.stability_margin)
+def searched_depth(op: Operation, deepest: float, ahead: float = 1.02) -> float:
+    """How deep [m] stability is searched for cuts down to `deepest` [m]: so far that the reserve can be told.
+
+    ahead: how many times as deep, where tool and workpiece allow it.
+    """
+    wanted = ahead * deepest / (1 - op.limits.stability_margin)
     bounds = op.tool.flute_length, 0.95 * op.workpiece.radius if op.workpiece.is_bar else op.workpiece.height
     return max(min(wanted, *bounds), deepest)
 
@@ -143,19 +146,20 @@ class LoadTable:
         return dict(zip(LOADS, found, strict=True))
 
 
-def load_table(op: Operation, depths: Floats, lowest: float, highest: float, ratios: int = RATIOS) -> LoadTable:
+def load_table(op: Operation, depths: Floats, lowest: float, highest: float, ratios: int | None = None) -> LoadTable:
     """Loads of `op` at depths (m,) [m] and speed ratios from `lowest` to `highest` [1], equally spaced in logarithm.
 
-    ratios: how many; two are exact without runout and edge forces.
+    ratios: how many, None for RATIOS or RUNOUT_RATIOS; two are exact without runout and edge forces.
     """
+    count = ratios or (RUNOUT_RATIOS if any(op.tool.runout) else RATIOS)
     milling = op.process == "milling"
-    at = np.zeros(1) if milling else np.geomspace(lowest, highest * (1 + 1e-9), ratios)
+    at = np.zeros(1) if milling else np.geomspace(lowest, highest * (1 + 1e-9), count)
     speed = op.conditions.workpiece_speed
     values = np.empty((len(LOADS), depths.size, at.size))
     for i, depth in enumerate(depths):
         for k, ratio in enumerate(at):
             cut = with_cut(op, depth=float(depth), tool_speed=None if milling else abs(speed) / float(ratio))
-            values[:, i, k] = _load_values(op, cutting_loads(op, cut, angles=180, elements=48))
+            values[:, i, k] = _load_values(op, cutting_loads(op, cut, elements=48))
     return LoadTable(depths, at, values)
 
 

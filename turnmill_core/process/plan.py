@@ -185,7 +185,7 @@ def choose(found: Region, depth_limit: Floats | None = None) -> Choice | None:
     gain = limit * weight
     candidates = np.flatnonzero(gain >= gain.max() * (1 - SAME_DEPTH))
     j = max(candidates.tolist(), key=lambda k: _reserves(found, k, 0.95 * float(limit[k])))
-    depth = math.floor(float(limit[j]) / DEPTH_STEP * (1 + 1e-9)) * DEPTH_STEP or float(limit[j])
+    depth = min(math.floor(float(limit[j]) / DEPTH_STEP * (1 + 1e-9)) * DEPTH_STEP or math.inf, float(limit[j]))
     for _ in range(CHECKS):
         choice = _checked(found, float(found.tool_speeds[j]), depth)
         if choice is not None:

@@ -77,15 +77,19 @@ class Region:
 
     @cached_property
     def depth_limit(self) -> Floats:
-        """Deepest feasible depth [m] at each tool speed (n,), 0 where there is none; margins are linear in between."""
+        """Deepest feasible depth [m] at each tool speed (n,), 0 where there is none.
+
+        Between two depths of the grid each margin is taken as linear.
+        """
         limit = np.zeros(self.tool_speeds.size)
         for j in np.flatnonzero(self.feasible.any(axis=0)):
             last = int(np.flatnonzero(self.feasible[:, j])[-1])
             limit[j] = self.depths[last]
             if last + 1 < self.depths.size:
-                here, beyond = max(self.least[last, j], 0.0), self.least[last + 1, j]
-                if math.isfinite(beyond):
-                    limit[j] += (self.depths[last + 1] - self.depths[last]) * here / (here - beyond)
+                here, beyond = np.maximum(self.stacked[:, last, j], 0.0), self.stacked[:, last + 1, j]
+                fails = beyond < 0
+                share = np.divide(here[fails], here[fails] - beyond[fails])
+                limit[j] += (self.depths[last + 1] - self.depths[last]) * float(share.min())
         return limit
 
     def speed_intervals(self, depth: float) -> list[tuple[float, float]]:
