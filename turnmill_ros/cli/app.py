@@ -12,7 +12,22 @@ from collections.abc import Callable
 import typer
 from rich.console import Console
 
-from turnmill_ros.cli import delay, detect_bench, forces, identify, lobes, model, modes, online, plan, recordings, stability, toolpath
+from turnmill_ros.cli import (
+    delay,
+    detect_bench,
+    forces,
+    identify,
+    lobes,
+    model,
+    modes,
+    online,
+    plan,
+    positions,
+    recordings,
+    stability,
+    toolpath,
+    workpiece,
+)
 from turnmill_ros.errors import InputError
 
 # The base of typer's usage errors; newer ones carry their own click.
@@ -23,8 +38,8 @@ app = typer.Typer(
     help="In-process monitoring of milling and turn-milling: forces, stability, chatter from recordings and live.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
 )
-for module in (model, forces, identify, modes, stability, lobes, delay, recordings, online, toolpath, plan,
-               detect_bench):
+for module in (model, forces, identify, modes, stability, lobes, delay, recordings, online, toolpath, plan, positions,
+               workpiece, detect_bench):
     module.register(app)
 
 

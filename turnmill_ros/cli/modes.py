@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 import yaml
 
-from turnmill_ros.cli.output import JsonFlag, console, new_file, print_json, quantity, table, whole
+from turnmill_ros.cli.output import JsonFlag, console, new_file, print_json, quantity, span, table, whole
 from turnmill_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ def modes(
         raise InputError("--write: give the operation that the modes go into with --operation")
     base = None if operation is None else find_operation(operation)
     frfs = read_frfs(file, node)
-    fits = fit_modes(frfs, _band(band), _list(near), whole(order, "--order", 4, 200))
+    limits = None if band is None else span(band, "Hz", "--band")
+    fits = fit_modes(frfs, limits, _list(near), whole(order, "--order", 4, 200))
     section = _section(fits, frame, cross, complex_residues)
     written = None if base is None else _placed(base, to, section, file.name)
     if html is not None:
@@ -80,15 +81,6 @@ def modes(
         console.print(f"written: {output}")
     elif base is None:
         console.print(yaml.safe_dump({"structure": section}, sort_keys=False, width=100).rstrip(), markup=False)
-
-
-def _band(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    low, dots, high = text.partition("..")
-    if not dots:
-        raise InputError("--band", value=text, expected="FROM..TO such as 200Hz..1500Hz")
-    return quantity(low, "Hz", "--band") or 0.0, quantity(high, "Hz", "--band") or 0.0
 
 
 def _list(text: str | None) -> list[float]:

@@ -42,6 +42,17 @@ def quantity(text: str | None, unit: str, option: str) -> float | None:
     return parse_quantity(text, unit, option)
 
 
+def span(text: str, unit: str, option: str) -> tuple[float, float]:
+    """Both ends, in SI, of a command line range such as ``200Hz..1500Hz``."""
+    low, dots, high = text.partition("..")
+    if not dots:
+        raise InputError(option, value=text, expected="FROM..TO, each with its unit")
+    ends = quantity(low, unit, option), quantity(high, unit, option)
+    assert ends[0] is not None
+    assert ends[1] is not None
+    return ends[0], ends[1]
+
+
 def whole(value: int, option: str, low: int, high: int | None = None) -> int:
     """Check that a whole number of the command line lies within its bounds; return it."""
     if value < low or (high is not None and value > high):
