@@ -70,7 +70,7 @@ def test_speed_error_from_phases(error: float) -> None:
     x = sum(np.cos(2 * math.pi * F * (1 + error) * h * t) / h for h in (4, 8, 12))
     _, layout = window(x)
     harmonics = np.array([4, 8, 12])
-    found = drift(layout, layout.values, harmonics, np.full(3, 1e-9))
+    found = drift(layout, synchronous(layout, layout.values, 1), harmonics, np.full(3, 1e-9))
     assert found.speed == pytest.approx(error, rel=0.15, abs=2e-5)
 
 
@@ -81,7 +81,7 @@ def test_ramp_from_phases() -> None:
     p, layout = window(x)
     assumed = constant_rotation(2 * math.pi * F, len(p.samples), p.rate).turns
     for _ in range(3):
-        found = drift(layout, layout.values, np.array([4, 8]), np.full(2, 1e-9))
+        found = drift(layout, synchronous(layout, layout.values, 1), np.array([4, 8]), np.full(2, 1e-9))
         assumed = followed(assumed, layout.revolutions, found)
         layout = lay_out(p, assumed, 1)
     inner = slice(len(assumed) // 10, -len(assumed) // 10)

@@ -56,8 +56,9 @@ def kalman_energy_ratios(x: NDArray[np.float64], turns: NDArray[np.float64], end
     Every harmonic of the spindle is a rotating state that is corrected by its share of the innovation at each
     sample: the steady state of a Kalman filter with equal noise on all harmonics. Energies are means of the
     Teager-Kaiser operator x[n]^2 - x[n-1] x[n+1]; the ratio is that of the residual over residual and periodic part.
-    The published detector takes 0.2 as its threshold and splits the residual into bands; here all of it is one. It runs through a signal x (n,) with `turns` (n,), revolutions of the spindle, and is read for
-    windows of `length` samples that end before each of `ends`; `harmonics` multiples of the spindle frequency are
+    The published detector takes 0.2 as its threshold and splits the residual into bands; here all of it is one.
+    It runs through a signal x (n,) with `turns` (n,), revolutions of the spindle, and is read for windows of `length`
+    samples that end before each of `ends`; `harmonics` multiples of the spindle frequency are
     tracked; gain: correction per sample, the reciprocal of a time constant in samples.
     """
     fastest = float(np.max(np.diff(turns), initial=1e-9))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from turnmill_core.monitoring import _kernels
 from turnmill_core.monitoring.separation import (
     LAYOUT,
     Drift,
@@ -141,7 +142,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
         half = _half_odd(parts, p.top, teeth)
         asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))
     else:
-        half = _half(np.arange(teeth // 2, len(clear), teeth) * layout.frequency, clear[teeth // 2:: teeth])
+        half = _half(np.arange(teeth / 2, len(clear), teeth) * layout.frequency, clear[teeth // 2:: teeth])
     low = int(lowest / found.step)
     noise_energy = float(found.floor[low:].sum())
     return Features(
@@ -215,7 +216,7 @@ def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
     tooth = harmonics % teeth == 0
     if power[tooth].sum() >= COMB_SHARE * power.sum():
         harmonics = harmonics[tooth]
-    return drift(parts.layout, parts.values, harmonics, noise[harmonics])
+    return drift(parts.layout, parts.one, harmonics, noise[harmonics])
 
 
 def _half_odd(parts: _Parts, top: float, teeth: int) -> HalfOrder:
@@ -298,31 +299,21 @@ def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spind
     The strongest line need not be H: loss of contact makes lines at 2 H and 3 H too, and sound and
     acceleration raise them.
     """
-    families = [_family(s, found, x, tooth_frequency, spindle_frequency, lowest) for x in found[:CANDIDATES]]
-    return max(families, key=lambda c: round(c.explained, 1), default=None)
-
-
-def _family(s: Spectrum, found: tuple[Line, ...], first: Line, tooth_frequency: float, spindle_frequency: float,
-            lowest: float) -> ChatterFamily:
-    tolerance = 1.2 * s.resolution
-    frequency = np.array([x.frequency for x in found])
-    energy = np.array([x.energy for x in found])
-    own = _away(frequency, first.frequency, tooth_frequency) <= tolerance
-    multiples = own.copy()
-    for m in (2, 3):
-        multiples |= _away(frequency, m * first.frequency, tooth_frequency) <= tolerance
-    explained = multiples | (_away(frequency, first.frequency, spindle_frequency) <= tolerance)
-    total = float(energy.sum())
-    next_to = np.abs(first.frequency + tooth_frequency * np.array([-2, -1, 1, 2]))
+    if not found:
+        return None
+    frequency, energy = np.array([x.frequency for x in found]), np.array([x.energy for x in found])
+    tolerance, total = 1.2 * s.resolution, float(energy.sum())
+    best: tuple[float, float, NDArray[np.bool_], float] | None = None
+    for x in found[:CANDIDATES]:
+        own, multiples, explained = _kernels.family_sums(frequency, energy, x.frequency, tooth_frequency,
+                                                         spindle_frequency, tolerance)
+        share = explained / total if total > 0 else 0.0
+        if best is None or round(share, 1) > round(best[1], 1):
+            best = x.frequency, share, own, multiples
+    assert best is not None
+    first, share, own, multiples = best
+    next_to = np.abs(first + tooth_frequency * np.array([-2, -1, 1, 2]))
     seen = near(s.power / s.floor, s, next_to, tolerance) > LINE_RATIO
     seen |= np.abs(frequency[:, None] - next_to).min(axis=0) <= tolerance
-    return ChatterFamily(first.frequency, float(energy[multiples].sum()), int(seen.sum()),
-                         float(energy[explained].sum()) / total if total > 0 else 0.0,
+    return ChatterFamily(first, multiples, int(seen.sum()), share,
                          tuple(sorted(frequency[own & (frequency >= lowest)].tolist())))
-
-
-def _away(frequency: Array, first: float, spacing: float) -> Array:
-    """Distance [Hz] of each frequency from the nearest of |first + i spacing|."""
-    up, down = (frequency - first) / spacing, (frequency + first) / spacing
-    found: Array = np.minimum(np.abs(up - np.rint(up)), np.abs(down - np.rint(down))) * spacing
-    return found

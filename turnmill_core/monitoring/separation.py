@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage, signal
 
+from turnmill_core.monitoring import _kernels
 from turnmill_core.monitoring.spectrum import Array, Spectrum
 
 LAYOUT = 2.5
@@ -28,11 +29,15 @@ LAYOUT = 2.5
 
 @dataclass(frozen=True)
 class Prepared:
-    """Window at a rate suited to the band: samples (mean removed), rate [Hz], top of the band [Hz]."""
+    """Window at a rate suited to the band.
+
+    samples (mean removed), rate [Hz], top of the band [Hz]; spline: coefficients of the cubic spline through them.
+    """
 
     samples: Array
     rate: float
     top: float
+    spline: Array
 
 
 def prepare(x: Array, rate: float, top: float) -> Prepared:
@@ -44,7 +49,17 @@ def prepare(x: Array, rate: float, top: float) -> Prepared:
     top = min(top, 0.45 * rate)
     up, down = max(1, math.ceil(4 * top / rate)), max(1, int(rate / (4 * top)))
     taps = _low_pass(top / (rate * up), up)
-    return Prepared(signal.resample_poly(x - x.mean(), up, down, window=taps), rate * up / down, top)
+    samples = _resampled(x - x.mean(), taps, up, down)
+    return Prepared(samples, rate * up / down, top, ndimage.spline_filter1d(samples, 3, mode="mirror"))
+
+
+def _resampled(x: Array, taps: Array, up: int, down: int) -> Array:
+    """scipy.signal.resample_poly without its checks: x at up / down of its rate, zero beyond its ends."""
+    half = (len(taps) - 1) // 2
+    lead = (down - half % down) % down
+    full: Array = signal.upfirdn(np.concatenate([np.zeros(lead), taps * up]), x, up, down)
+    first, count = (half + lead) // down, -(-len(x) * up // down)
+    return full[first: first + count]
 
 
 @lru_cache(maxsize=16)
@@ -100,9 +115,8 @@ def lay_out(p: Prepared, turns: Array, multiple: int) -> Layout:
         raise ValueError(f"window holds {total:.3g} revolutions, expected at least {3 * multiple}")
     frequency = total * p.rate / (len(turns) - 1)
     points = fft.next_fast_len(math.ceil(LAYOUT * p.top / frequency), real=True)
-    angle = turns[-1] - revolutions + (np.arange(revolutions * points) + 1) / points
-    index = np.interp(angle, turns, np.arange(len(turns)))
-    values = ndimage.map_coordinates(p.samples, index[None, :], order=3, mode="nearest")
+    values, index = _kernels.spline_at(p.spline, turns, float(turns[-1] - revolutions), 1 / points,
+                                       revolutions * points)
     return Layout(frequency, revolutions, points, values, index / p.rate)
 
 
@@ -112,7 +126,8 @@ class Synchronous:
 
     wave: its values in the order of the layout; mean, trend: complex amplitudes at multiples 0, 1,
     2 ... of the spindle frequency over `period`, and their change per revolution; the peak
-    amplitude of a harmonic is |mean|; rows: number of periods averaged.
+    amplitude of a harmonic is |mean|; rows: number of periods averaged; bend: per angle, what the values
+    change with the square of the period's number.
     """
 
     period: int
@@ -120,6 +135,7 @@ class Synchronous:
     wave: Array
     mean: Array
     trend: Array
+    bend: Array
 
     def energy(self) -> Array:
         """Mean square of every harmonic with its trend, in the weights of a Spectrum (Hann squared)."""
@@ -134,12 +150,11 @@ class Synchronous:
 def synchronous(layout: Layout, values: Array, period: int) -> Synchronous:
     """Synchronous part of `values` (laid out like `layout`) over `period` revolutions, with linear trend."""
     table = values.reshape(layout.revolutions // period, period * layout.points)
-    rows = (np.arange(len(table)) - (len(table) - 1) / 2) * period
-    mean = table.mean(axis=0)
-    trend = np.einsum("i,ij->j", rows, table) / np.sum(rows**2)
+    rows = np.arange(len(table)) - (len(table) - 1) / 2
+    mean, trend, bend = _kernels.row_fits(table)
     scale = 2 / (period * layout.points)
     return Synchronous(period, len(table), (mean + rows[:, None] * trend).ravel(),
-                       fft.rfft(mean) * scale, fft.rfft(trend) * scale)
+                       fft.rfft(mean) * scale, fft.rfft(trend) * (scale / period), bend)
 
 
 def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Array:
@@ -170,29 +185,25 @@ class Drift:
     ramp: float = 0.0
 
 
-def drift(layout: Layout, values: Array, harmonics: NDArray[np.integer[Any]], noise: Array) -> Drift:
-    """Drift of `values` seen in the phases of the harmonics (multiples of the spindle frequency).
+def drift(layout: Layout, one: Synchronous, harmonics: NDArray[np.integer[Any]], noise: Array) -> Drift:
+    """Drift seen in the phases of the harmonics (multiples of the spindle frequency) of a synchronous part.
 
-    A wrong speed turns the phase of harmonic h by 2 pi h error each revolution, a wrong ramp bends
-    it. Per harmonic from least squares over the revolutions (mean, trend, bend), then weighted
-    medians over the harmonics above the noise, so that a line near one harmonic moves it little;
-    noise: mean square that noise alone gives each. Zero without any such harmonic.
+    one: over single revolutions of `layout`. A wrong speed turns the phase of harmonic h by 2 pi h error each
+    revolution, a wrong ramp bends it. Per harmonic from least squares over the revolutions (mean, trend,
+    bend), then weighted medians over the harmonics above the noise, so that a line near one harmonic
+    moves it little; noise: mean square that noise alone gives each. Zero without any such harmonic.
     """
-    table = values.reshape(layout.revolutions, layout.points)
-    r = np.arange(layout.revolutions) - (layout.revolutions - 1) / 2
-    basis = np.stack([np.ones_like(r), r, r**2 - np.mean(r**2)])
-    fitted = fft.rfft(np.einsum("ij,jk->ik", basis / np.sum(basis**2, axis=1)[:, None], table))[:, harmonics]
-    fitted *= 2 / layout.points
-    power = np.abs(fitted[0]) ** 2
+    power = np.abs(one.mean[harmonics]) ** 2
     use = power > 20 * noise
     if not use.any():
         return Drift()
-    a, b, c = fitted[:, use]
-    power, order = power[use], harmonics[use]
+    order, power = harmonics[use], power[use]
+    bend = fft.rfft(one.bend) * (2 / layout.points)
+    conjugate = np.conj(one.mean[order])
     weight = order * np.minimum(1.0, np.sqrt(power / np.median(power)))
     scale = 2 * math.pi * order * power
-    return Drift(_weighted_median(np.imag(np.conj(a) * b) / scale, weight),
-                 _weighted_median(np.imag(np.conj(a) * c) / scale, weight))
+    return Drift(_weighted_median(np.imag(conjugate * one.trend[order]) / scale, weight),
+                 _weighted_median(np.imag(conjugate * bend[order]) / scale, weight))
 
 
 def _weighted_median(values: Array, weight: Array) -> float:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
 
-Array = NDArray[np.floating[Any]]
+Array = NDArray[np.float64]
 
 PAD = 2
 """Zero padding of every spectrum: bins per reciprocal window length."""
@@ -37,7 +36,7 @@ class Spectrum:
     @property
     def frequency(self) -> Array:
         """Frequency of every bin [Hz]."""
-        return np.arange(len(self.power)) * self.step
+        return np.arange(float(len(self.power))) * self.step
 
 
 @dataclass(frozen=True)

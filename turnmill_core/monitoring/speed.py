@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -59,7 +60,7 @@ class Rotation:
 
 def constant_rotation(speed: float, count: int, rate: float) -> Rotation:
     """Rotation at a constant speed [rad/s] over `count` samples at `rate` [Hz]."""
-    return Rotation(np.arange(count) * (speed / (2 * math.pi * rate)), speed, 0.0)
+    return Rotation(np.arange(float(count)) * (speed / (2 * math.pi * rate)), speed, 0.0)
 
 
 def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: int, rate: float,
@@ -76,9 +77,12 @@ def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: 
     used = held[first: max(last, first + 1) + 1]
     if len(used) < 2:
         return constant_rotation(used[0].speed, count, rate)
-    stamps = np.array([h.stamp_ns - start_ns for h in used], dtype=np.int64)
-    if np.diff(stamps).max() > longest_gap_ns:
+    if max(b.stamp_ns - a.stamp_ns for a, b in pairwise(used)) > longest_gap_ns:
         return None
+    slowest, fastest = min(h.speed for h in used), max(h.speed for h in used)
+    if slowest == fastest > 0:
+        return constant_rotation(slowest, count, rate)
+    stamps = np.array([h.stamp_ns - start_ns for h in used], dtype=np.int64)
     at = stamps.astype(np.float64) * 1e-9
     speed = np.array([h.speed for h in used])
     times = np.arange(count) / rate

@@ -6,6 +6,7 @@ memory is bounded. Windows end at multiples of the hop in the sample index, what
 
 from __future__ import annotations
 
+import bisect
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,8 +111,13 @@ def advance(stream: Stream, hop: int, longest: int) -> Stream:
     newer = [a for a in stream.anchors if a[0] > keep]
     return replace(stream, next_end=next_end, anchors=(*stream.anchors[len(stream.anchors) - len(newer) - 1:],)
                    if len(newer) < len(stream.anchors) else stream.anchors,
-                   blocks=tuple(b for b in stream.blocks if b.end_sample > keep),
+                   blocks=stream.blocks[_first_after(stream.blocks, keep):],
                    breaks=tuple(b for b in stream.breaks if b.end > keep))
+
+
+def _first_after(blocks: tuple[SensorBlock, ...], sample: int) -> int:
+    """Index of the first block that ends after `sample`."""
+    return bisect.bisect_right(blocks, sample, key=lambda b: b.end_sample)
 
 
 def trouble(stream: Stream, start: int, end: int) -> tuple[Reason, str]:
@@ -126,18 +132,21 @@ def trouble(stream: Stream, start: int, end: int) -> tuple[Reason, str]:
 
 def samples(stream: Stream, start: int, end: int, channel: int) -> NDArray[np.float32]:
     """Samples [start, end) of one channel; the stream must hold them all."""
-    parts = [b.samples[max(0, start - b.first_sample): end - b.first_sample, channel]
-             for b in stream.blocks if b.end_sample > start and b.first_sample < end]
-    return np.concatenate(parts)
+    return np.concatenate([b.samples[max(0, start - b.first_sample): end - b.first_sample, channel]
+                           for b in _inside(stream, start, end)])
 
 
 def status(stream: Stream, start: int, end: int, channel: int) -> Status:
     """Union of the status flags of one channel over window [start, end)."""
     flags = Status.OK
-    for b in stream.blocks:
-        if b.end_sample > start and b.first_sample < end:
-            flags |= b.channels[channel].status
+    for b in _inside(stream, start, end):
+        flags |= b.channels[channel].status
     return flags
+
+
+def _inside(stream: Stream, start: int, end: int) -> tuple[SensorBlock, ...]:
+    """Blocks that hold samples of [start, end)."""
+    return stream.blocks[_first_after(stream.blocks, start): _first_after(stream.blocks, end - 1) + 1]
 
 
 def _plain(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:

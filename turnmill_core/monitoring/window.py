@@ -84,7 +84,7 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
     blank = replace(blank, channel=s.channels[channel].name)
     if reason is not Reason.NONE:
         return _unknown(tracker, blank, reason, text)
-    level = float(x.std())
+    level = math.sqrt(max(0.0, float(np.einsum("i,i", x, x)) / len(x) - float(x.mean()) ** 2))
     blank = replace(blank, level=level)
     if end_speed <= 0 or seconds * end_speed < FEWEST_REVOLUTIONS * 2 * math.pi:
         return _unknown(tracker, blank, Reason.NO_SPEED, "the spindle stands still, is too slow for a window, or its "

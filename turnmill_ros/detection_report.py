@@ -1,0 +1,129 @@
+"""Tables, JSON and pictures of the detection benchmark."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource as Source
+from bokeh.models import FactorRange, LabelSet
+from bokeh.plotting import figure
+
+from turnmill_core.detection.bench import LATE, Plan, Tally
+from turnmill_core.detection.cuts import KINDS, TRAIN_END
+from turnmill_core.detection.hearing import INDICATORS
+from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_ros import figures
+from turnmill_ros.report import html_table, write_page
+
+
+def _share(part: tuple[int, int]) -> str:
+    return f"{100 * part[0] / part[1]:.1f} % of {part[1]}" if part[1] else "none asked"
+
+
+def summary_rows(found: Tally) -> list[tuple[str, str, str]]:
+    """What, found, wanted."""
+    delays = np.array(found.delays)
+    in_time = int(np.sum(delays <= np.array(found.tripled)))
+    per_hour = f"{found.false_alarms / found.hours:.2f} per hour" if found.hours > 0 else "no such signal"
+    rows = [
+        ("false alarms", f"{found.false_alarms} in {found.hours:.2f} h ({per_hour})", "at most 1 per hour"),
+        ("flip or runout, undecided, in the same hours", f"{found.undecided}", ""),
+        (f"Hopf chatter found within {LATE:g} s of full amplitude", _share(found.hopf), "at least 95 %"),
+        ("period two, odd teeth, found likewise", _share(found.flip_odd), "at least 90 %"),
+        ("flip or runout, even teeth, prior of a wrong model", _share(found.half_order_prior), "at least 90 %"),
+        ("the same without a prior: FLIP_OR_RUNOUT", _share(found.half_order), "all"),
+        ("alarm on depth ramps after 20 %, median", f"{np.nanmedian(delays):.3f} s" if len(delays) else "none asked",
+         f"at most {LATE:g} s"),
+        ("alarm on depth ramps before tripled", _share((in_time, len(delays))), "all"),
+        ("verdicts that a tachometer 1 % wrong changes", _share(found.changed), "at most 1 %"),
+        ("CPU time per second of signal", f"{found.cpu:.3f} s", ""),
+    ]
+    return rows + [(f"area under the ROC curve, {name}", f"{area:.4f}", "")
+                   for name, area in zip(INDICATORS, found.areas, strict=True)]
+
+
+def confusion_rows(found: Tally) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of the confusion of windows."""
+    kinds = [k for k in ChatterKind if found.confusion[k].any()]
+    rows = [(k.name, *(str(int(n)) for n in found.confusion[k])) for k in kinds]
+    return ("truly", *(k.name for k in ChatterKind)), rows
+
+
+def figures_json(plan: Plan, found: Tally) -> dict[str, Any]:
+    """The figures as JSON values."""
+    delays = np.array(found.delays)
+    return {
+        "seeds": "training" if plan.first < TRAIN_END else "test", "cuts": dict(zip(KINDS, plan.cuts, strict=True)),
+        "confusion": {t.name: {s.name: int(found.confusion[t, s]) for s in ChatterKind} for t in ChatterKind
+                      if found.confusion[t].any()},
+        "false_alarms": found.false_alarms, "quiet_hours": found.hours, "undecided": found.undecided,
+        **{name: {"right": part[0], "of": part[1]} for name, part in (
+            ("hopf", found.hopf), ("period_two_odd_teeth", found.flip_odd),
+            ("half_order_with_prior", found.half_order_prior), ("half_order_without_prior", found.half_order),
+            ("changed_by_tachometer", found.changed))},
+        "ramp_delays_s": list(found.delays), "ramp_tripled_s": list(found.tripled),
+        "ramp_delay_median_s": float(np.nanmedian(delays)) if len(delays) else math.nan,
+        "roc_areas": dict(zip(INDICATORS, found.areas, strict=True)),
+        "recalls": found.recalls, "false_alarms_per_hour_at_recall": {
+            name: found.false_at[:, k] for k, name in enumerate(INDICATORS)},
+        "cpu_s_per_s": found.cpu, "missed": list(found.missed), "false_alarms_in": list(found.raised),
+    }
+
+
+def detection_report(output: Path, plan: Plan, found: Tally) -> None:
+    """Write the page with tables and pictures."""
+    header, rows = confusion_rows(found)
+    seeds = "training" if plan.first < TRAIN_END else "test"
+    write_page(output, "turnmill: detection", [
+        "<h1>How well the monitor hears</h1>",
+        f"<p class=note>{sum(plan.cuts)} simulated cuts and {plan.hours:g} h of signal without chatter, {seeds} "
+        "seeds; labelled by the motion without noise.</p>",
+        html_table(summary_rows(found), ("what", "found", "wanted")), "<h2>Windows</h2>", html_table(rows, header),
+    ], [("Pictures", false_alarm_curves(found)), ("", confusion_picture(found)), ("", delays_picture(found))], [])
+
+
+def false_alarm_curves(found: Tally) -> figure:
+    """False alarms per hour over recall, one curve per indicator."""
+    plot = figures.new_figure("False alarms at each recall", "share of chatter windows found [1]",
+                              "false alarms per hour [1/h]", 320, y_axis_type="log", x_range=(0, 1))
+    lowest = 1 / max(found.hours, 1e-3) / 2
+    for k, name in enumerate(INDICATORS):
+        plot.line(found.recalls, np.maximum(found.false_at[:, k], lowest), line_width=2.5, legend_label=name,
+                  color=figures.LINE_COLOURS[k], line_dash=("solid", "dashed", "dotdash", "dotted")[k])
+    figures.legend_right(plot)
+    return plot
+
+
+def confusion_picture(found: Tally) -> figure:
+    """Confusion as shares of each row."""
+    kinds = [k for k in ChatterKind if found.confusion[k].any()]
+    plot = figures.new_figure("What was said of each true state", "verdict", "true state", 300,
+                              x_range=FactorRange(*[k.name for k in ChatterKind]),
+                              y_range=FactorRange(*[k.name for k in reversed(kinds)]))
+    cells = [(t, s, found.confusion[t, s] / found.confusion[t].sum()) for t in kinds for s in ChatterKind]
+    source = Source({"x": [s.name for _, s, _ in cells], "y": [t.name for t, _, _ in cells],
+                     "alpha": [float(v) ** 0.5 for _, _, v in cells],
+                     "text": [f"{100 * v:.1f} %" if v else "" for _, _, v in cells]})
+    plot.rect("x", "y", 0.96, 0.92, source=source, fill_color=figures.LINE_COLOURS[5], fill_alpha="alpha",
+              line_color="#888888")
+    plot.add_layout(LabelSet(x="x", y="y", text="text", source=source, text_align="center", text_baseline="middle",
+                             text_font_size="10pt"))
+    plot.grid.visible = False
+    return plot
+
+
+def delays_picture(found: Tally) -> figure:
+    """Alarm of every depth ramp after the 20 % crossing beside the time in which the amplitude triples."""
+    plot = figures.new_figure("Alarms on depth ramps", "time from the crossing of 20 % to tripled amplitude [s]",
+                              "alarm after the crossing [s]", 300)
+    tripled, delays = np.array(found.tripled), np.array(found.delays)
+    at = np.isfinite(tripled) & np.isfinite(delays)
+    plot.scatter(tripled[at], delays[at], size=8, color=figures.LINE_COLOURS[0], legend_label="alarm")
+    ends = [0.0, float(tripled[at].max(initial=0.3))]
+    plot.line(ends, ends, color="#444444", line_dash="dashed", legend_label="tripled")
+    plot.line(ends, [LATE, LATE], color="#444444", line_dash="dotted", legend_label=f"{LATE:g} s")
+    figures.legend_right(plot)
+    return plot
