@@ -93,7 +93,7 @@ def printed_extremes(op: Operation, conditions: Conditions, angle: Floats, axial
 
     axial: displacement of the tool against the workpiece along +z_T at tool angles `angle` [rad] (n,).
     """
-    arcs = prepare_cut(op, conditions, 1).engagement
+    arcs = prepare_cut(op, conditions, ELEMENTS).engagement  # the first height is next to the tip
     turned = np.mod(angle[:, None] + np.cumsum((0.0, *op.tool.pitch[:-1])) - arcs.start[0, 0], 2 * np.pi)
     printing = np.any(turned <= arcs.exit[0, 0] - arcs.start[0, 0], axis=1)
     chosen = axial[printing] if printing.any() else axial

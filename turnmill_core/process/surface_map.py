@@ -11,6 +11,7 @@ stands the tooth print of the thesis, which takes the workpiece as a plane and o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,10 +22,11 @@ from turnmill_core.cutting.feed import cross_feed_sense
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.operation_cutter import outline
 from turnmill_core.process._kernels.envelope import bottom_height, envelope
-from turnmill_core.process.surface import steady_axial
+from turnmill_core.process.surface import ELEMENTS, steady_axial
 from turnmill_core.process.surface_profile import surface_feed_per_tooth
 
 Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
 TWO_PI = 2 * math.pi
 
 PER_FACET = 6
@@ -32,6 +34,7 @@ ROWS = 200
 BINS = 400
 ACROSS = 1200
 LARGEST = 20_000_000
+CHUNK = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +74,15 @@ class SurfaceMap:
 
 def surface_map(
     op: Operation, conditions: Conditions, around: float | None = None, passes: float = 1.0, columns: int | None = None,
-    rows: int = ROWS, vibration: tuple[Floats, Floats] | None = None,
+    rows: int = ROWS, vibration: tuple[Floats, Floats] | None = None, progress: Progress | None = None,
 ) -> SurfaceMap:
     """Finished surface over `around` [rad] of the workpiece and `passes` axial feeds.
 
     around: None for a full workpiece revolution. columns, rows: cells (columns None: six to every tooth pass).
     vibration: tool angle [rad] (p,), equally spaced over a revolution from 0, and displacement of the tool against
-    the workpiece along +z_T [m] (p,); None: the steady vibration of the linear cut. Raises ``ValueError`` for milling,
-    a tilted tool, no contact, or more cells than memory is for.
+    the workpiece along +z_T [m] (p,); None: the steady vibration of the linear cut.
+    progress: called with the share that is done. Raises ``ValueError`` for milling, a tilted tool, no contact, or more
+    cells than memory is for.
     """
     require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
     require(op.tilt == 0, "tilt", op.tilt, "rad", "0: the surface of a tilted tool is not described")
@@ -95,7 +99,7 @@ def surface_map(
     feed = conditions.feed_speed * TWO_PI / speed
     angle, axial = _middles(span, n), _middles(passes * feed, rows)
     moved = steady_axial(op, conditions)[1] if vibration is None else vibration[1]
-    return SurfaceMap(angle, axial, _lowest(op, conditions, angle, axial, np.ascontiguousarray(moved)),
+    return SurfaceMap(angle, axial, _lowest(op, conditions, angle, axial, np.ascontiguousarray(moved), progress),
                       conditions.effective_radius)
 
 
@@ -104,7 +108,9 @@ def _middles(length: float, cells: int) -> Floats:
     return np.asarray((np.arange(cells) + 0.5) * (length / cells), dtype=np.float64)
 
 
-def _lowest(op: Operation, conditions: Conditions, angle: Floats, axial: Floats, moved: Floats) -> Floats:
+def _lowest(
+    op: Operation, conditions: Conditions, angle: Floats, axial: Floats, moved: Floats, progress: Progress | None,
+) -> Floats:
     """Heights (m, n) of the envelope."""
     tool, speed = op.tool, abs(conditions.workpiece_speed)
     runout = np.array(tool.shape.axial_runout or (0.0,) * tool.teeth)
@@ -115,10 +121,16 @@ def _lowest(op: Operation, conditions: Conditions, angle: Floats, axial: Floats,
     lead = cross_feed_sense(conditions) * conditions.feed_speed / speed
     spread = float(np.ptp(moved)) + float(np.ptp(runout))
     feed = surface_feed_per_tooth(op, conditions) * (tool.teeth if np.ptp(runout) > 0 else 1)
-    height = np.full((axial.size, angle.size), conditions.depth)
-    envelope(angle, axial, conditions.effective_radius, lead, np.array([conditions.tool_speed, speed]), teeth, bottom,
-             reach, offset, _window(conditions.effective_radius, bottom, reach, offset, spread, feed), spread, moved,
-             height)
+    speeds = np.array([conditions.tool_speed, speed])
+    window = _window(conditions.effective_radius, bottom, reach, offset, spread, feed)
+    height = np.empty((axial.size, angle.size))
+    for first in range(0, angle.size, CHUNK):
+        part = np.full((axial.size, angle[first : first + CHUNK].size), conditions.depth)
+        envelope(angle[first : first + CHUNK], axial, conditions.effective_radius, lead, speeds, teeth, bottom, reach,
+                 offset, window, spread, moved, part)
+        height[:, first : first + CHUNK] = part
+        if progress is not None:
+            progress(min(1.0, (first + CHUNK) / angle.size))
     return height
 
 
@@ -177,7 +189,7 @@ def tooth_print(op: Operation, conditions: Conditions, columns: int = 120, rows:
     """
     require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
     require(conditions.in_cut, "depth", conditions.depth, "m", "a cut (contact, both spindles turning)")
-    arcs = prepare_cut(op, conditions, 1).engagement
+    arcs = prepare_cut(op, conditions, ELEMENTS).engagement
     angle = np.linspace(arcs.start[0, 0], arcs.exit[0, 0], columns)
     place = np.linspace(0.0, surface_feed_per_tooth(op, conditions), rows)
     shape = op.tool.shape

@@ -25,7 +25,9 @@ from turnmill_ros.cli import (
     positions,
     recordings,
     stability,
+    surface,
     toolpath,
+    vibration,
     workpiece,
 )
 from turnmill_ros.errors import InputError
@@ -38,8 +40,10 @@ app = typer.Typer(
     help="In-process monitoring of milling and turn-milling: forces, stability, chatter from recordings and live.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
 )
-for module in (model, forces, identify, modes, stability, lobes, delay, recordings, online, toolpath, plan, positions,
-               workpiece, detect_bench):
+for module in (
+    model, forces, identify, modes, vibration, surface, stability, lobes, delay, recordings, online,
+    toolpath, plan, positions, workpiece, detect_bench,
+):
     module.register(app)
 
 
