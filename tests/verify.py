@@ -17,8 +17,8 @@ PAGE = ROOT / "docs" / "validation.md"
 HEAD = """# Validation: published beside computed
 
 Written by `make verify`; do not edit. Every published number that the model can be asked for stands here
-beside what it computes, with the reason where they differ. No number was fitted, but where a row says so. Sources: A. Comak,
-*Mechanics, Dynamics and Stability of Turn-Milling Operations*, PhD thesis, UBC, 2018 (tables, figures and
+beside what it computes, with the reason where they differ. No number was fitted but where a row says so. Sources:
+A. Comak, *Mechanics, Dynamics and Stability of Turn-Milling Operations*, PhD thesis, UBC, 2018 (tables, figures and
 equations are its own; its errata stand in [errata.md](errata.md)), and the papers named in the rows.
 """
 

@@ -154,6 +154,6 @@ def ram() -> list[Row]:
         position = (0.0, place[0], -op.conditions.depth, 0.0, 0.0, 0.0)
         limit = stability_boundary(op, speeds, 20e-3, position=position).depth_limit.min() * 1e3
         found.append(Row(f"lowest depth limit of the slot, {name} ram", "section 4.3.7.1, Figure 4.43", published,
-                         limit, "mm", "2000 to 12000 rpm; mode in Z: damping and mass of Table 4.9; it is what limits the "
+                         limit, "mm", "2000 to 12000 rpm; mode in Z: damping and mass of Table 4.9; it limits the "
                          "shortest ram. Both 15 % high, their ratio as printed (coefficients and Z mode are read)"))
     return found
