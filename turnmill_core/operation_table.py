@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from .operation import Operation, Structure, Vector
+from .operation import Operation
 from .operation_limits import NO_LIMITS, Limits
+from .operation_structure_table import beam_rows, structure_rows
 
 Rows = list[tuple[str, str]]
 
@@ -16,23 +17,6 @@ def _rpm(speed: float) -> str:
 
 def _mm(length: float) -> str:
     return "no limit" if math.isinf(length) else f"{length * 1e3:.6g} mm"
-
-
-def _shape(shape: Vector) -> str:
-    direct = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
-    return direct.get(shape) or "({:g}, {:g}, {:g})".format(*shape)
-
-
-def _modes(structure: Structure) -> Rows:
-    if not structure.modes:
-        return [("structure", "rigid")]
-    return [("structure", f"{len(structure.modes)} modes, {structure.frame} frame")] + [
-        (
-            f"mode {number} in {_shape(mode.shape)}",
-            f"{mode.frequency:.6g} Hz, {mode.damping * 100:.6g} %, {mode.mass:.6g} kg, {mode.stiffness / 1e6:.4g} N/um",
-        )
-        for number, mode in enumerate(structure.modes, 1)
-    ]
 
 
 def describe(op: Operation) -> list[tuple[str, Rows]]:
@@ -52,9 +36,9 @@ def describe(op: Operation) -> list[tuple[str, Rows]]:
     chip = " ".join(f"{k / 1e6:.6g}" for k in (material.Ktc, material.Krc, material.Kac))
     sections = [
         ("operation", [("name", op.name), ("process", op.process), ("machine", op.machine)]),
-        ("tool", tool_rows + _modes(tool.structure)),
+        ("tool", tool_rows + structure_rows(tool.structure)),
         ("workpiece", [("name", bar.name), *size, ("datum", ", ".join(_mm(d) for d in bar.datum)),
-                       *_modes(bar.structure)]),
+                       *(structure_rows(bar.structure) if bar.beam is None else beam_rows(bar.beam))]),
         ("material", [("name", material.name), ("Ktc Krc Kac", f"{chip} MPa"), ("Kte Kre Kae", f"{edge} N/mm")]),
         ("cut", _cut_rows(op)),
     ]
