@@ -11,7 +11,7 @@ from tests.bag_cases import TYPES, axes, block
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_ros.conversions import axes_to_message, block_from_message, block_to_message
 from turnmill_ros.interfaces import typestore
-from turnmill_ros.serialized import extent, shifted
+from turnmill_ros.serialized import extent, measures, shifted, stamp_ns
 
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 BLOCK = "turnmill_msgs/msg/SensorBlock"
@@ -33,6 +33,17 @@ def test_only_the_stamp_changes_without_streams() -> None:
     data = bytes(typestore().serialize_cdr(axes_to_message(axes(5), TYPES), "sensor_msgs/msg/JointState"))
     assert shifted(data, 0) == data
     assert shifted(shifted(data, 77), -77) == data
+
+
+def test_stamp_and_quantities_are_read_without_decoding() -> None:
+    message = axes_to_message(axes(1_234_567_890_123), TYPES)
+    data = bytes(typestore().serialize_cdr(message, "sensor_msgs/msg/JointState"))
+    assert stamp_ns(data) == 1_234_567_890_123
+    found = bytes(typestore().serialize_cdr(block_to_message(block(0), TYPES), BLOCK))
+    assert measures(found, ("force", "displacement"))
+    assert not measures(found, ("force", "power"))
+    with pytest.raises(ValueError, match="header"):
+        stamp_ns(b"short")
 
 
 def test_big_endian_data_is_refused() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from typing import NamedTuple
 
 HEADER = 4
@@ -42,6 +43,20 @@ def extent(data: bytes) -> Extent:
         return Extent(device, stream_id, first_sample, values // channels)
     except (struct.error, UnicodeDecodeError, ZeroDivisionError) as error:
         raise ValueError("not a serialized sensor block") from error
+
+
+def stamp_ns(data: bytes) -> int:
+    """Time [ns] of a message that begins with std_msgs/Header. Raises ValueError for anything too short."""
+    try:
+        sec, nanosec = struct.unpack_from("<iI", data, HEADER)
+    except struct.error as error:
+        raise ValueError("not a serialized message with a header") from error
+    return int(sec) * 1_000_000_000 + int(nanosec)
+
+
+def measures(data: bytes, quantities: Iterable[str]) -> bool:
+    """False where a serialized SensorBlock has no channel of these quantities; True may be by chance."""
+    return any(f"{quantity}\0".encode() in data for quantity in quantities)
 
 
 def shifted(data: bytes, delta_ns: int, streams: int = 0) -> bytes:

@@ -99,8 +99,10 @@ def cutting_loads(
             turns.append(_Turn(below.force_tool, below.tool_torque, below.workpiece_torque,
                                below.force_tool.mean(axis=0), float(below.tool_torque.mean()),
                                float(below.workpiece_torque.mean()), below.chip_thickness_max))
-    rate = removal_rate(op, conditions) if turns else 0.0
-    removal = Removal(rate - bottom_rate(op, conditions), bottom_rate(op, conditions), rate) if turns else _NOTHING
+    removal = _NOTHING
+    if turns:
+        rate, through = removal_rate(op, conditions), bottom_rate(op, conditions)
+        removal = Removal(rate - through, through, rate)
     return _loads(op, turns, angles, machine_from_tool(op, conditions), conditions.tool_speed,
                   conditions.workpiece_speed, arcs, removal)
 
@@ -227,5 +229,6 @@ def _loads(
 
 def _peak(values: Array) -> Array:
     """The value of largest magnitude along the first axis, with its sign."""
-    index = np.abs(values).argmax(axis=0)
-    return np.asarray(np.take_along_axis(values, np.expand_dims(index, 0), axis=0)[0], dtype=np.float64)
+    columns = values.reshape(len(values), -1)
+    found = columns[np.abs(columns).argmax(axis=0), np.arange(columns.shape[1])]
+    return np.asarray(found.reshape(values.shape[1:]), dtype=np.float64)

@@ -7,6 +7,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState
+from rclpy.serialization import deserialize_message
 
 from turnmill_core.cutting.along_path import Method
 from turnmill_core.cutting.loads import CuttingLoads
@@ -25,11 +26,12 @@ from turnmill_ros.conversions import (
 from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.loads_follower import LoadsFollower
-from turnmill_ros.measured import Comparison, Source
+from turnmill_ros.measured import UNITS, Comparison, Source
 from turnmill_ros.node_table import LOAD_PLOTS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.operation_track import OperationTrack
 from turnmill_ros.parameters import declare
+from turnmill_ros.serialized import measures, stamp_ns
 
 
 class ForcePredictor(LifecycleNode):
@@ -53,8 +55,8 @@ class ForcePredictor(LifecycleNode):
             topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, topics.FORCE_SCALE, *LOAD_PLOTS)}
         self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
         support.subscription(self, topics.OPERATION, self.on_operation)
-        support.subscription(self, topics.JOINT_STATES, self.on_axes)
-        support.subscription(self, topics.SENSOR_BLOCKS, self.on_block)
+        support.subscription(self, topics.JOINT_STATES, self.on_axes, raw=True)
+        support.subscription(self, topics.SENSOR_BLOCKS, self.on_block, raw=True)
         support.subscription(self, topics.WRENCH_MEASURED, self.on_wrench)
 
     def _fresh(self) -> LoadsFollower:
@@ -84,14 +86,14 @@ class ForcePredictor(LifecycleNode):
         support.wait_until_acknowledged(self)
         self.diagnostics.enter("stopped", done=True)
 
-    def on_axes(self, message: Any) -> None:
-        """Predict the loads of an axis state, if it is time to."""
+    def on_axes(self, data: bytes) -> None:
+        """Predict the loads of a serialized axis state, if it is time to; most need not be decoded."""
         self._received += 1
-        stamp = support.stamp_ns(message)
+        stamp = stamp_ns(data)
         operation = self._operations.at(stamp)
         if not self._follower.due(stamp) or operation is None:
             return
-        axes = axes_from_message(message)
+        axes = axes_from_message(deserialize_message(data, ros_types()[topics.JOINT_STATES.type]))
         try:
             found = self._follower.loads(operation, axes)
             self._refused = ""
@@ -103,10 +105,11 @@ class ForcePredictor(LifecycleNode):
         self._sent += 1
         self._publish(self._comparison.add_loads(found.loads, axes.velocity[5], stamp), operation)
 
-    def on_block(self, message: Any) -> None:
-        """Take measured force, torque and power."""
-        block = block_from_message(message)
-        self._publish(self._comparison.add_block(block), self._operations.at(block.stamp_ns))
+    def on_block(self, data: bytes) -> None:
+        """Take measured force, torque and power of a serialized block; one without them is not decoded."""
+        if measures(data, UNITS):
+            block = block_from_message(deserialize_message(data, ros_types()[topics.SENSOR_BLOCKS.type]))
+            self._publish(self._comparison.add_block(block), self._operations.at(block.stamp_ns))
 
     def on_wrench(self, message: Any) -> None:
         """Take a measured force."""
