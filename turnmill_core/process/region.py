@@ -93,10 +93,21 @@ class Region:
         return limit
 
     def speed_intervals(self, depth: float) -> list[tuple[float, float]]:
-        """Intervals of tool speed [rad/s] in which at least `depth` [m] is feasible (thesis Eq. 5.8)."""
-        found, runs = self.tool_speeds, self.depth_limit >= depth * (1 - TINY)
+        """Intervals of tool speed [rad/s] in which at least `depth` [m] is feasible (thesis Eq. 5.8).
+
+        Between two speeds of the grid the depth limit is taken as linear, unless one of them allows no cut at all.
+        """
+        speed, limit = self.tool_speeds, self.depth_limit
+        runs = limit >= depth * (1 - TINY)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], runs, [False]]).astype(int)))
-        return [(float(found[a]), float(found[b - 1])) for a, b in edges.reshape(-1, 2)]
+
+        def end(inside: int, outside: int) -> float:
+            if not 0 <= outside < speed.size or limit[outside] == 0:
+                return float(speed[inside])
+            share = (limit[inside] - depth) / (limit[inside] - limit[outside])
+            return float(speed[inside] + max(share, 0.0) * (speed[outside] - speed[inside]))
+
+        return [(end(a, a - 1), end(b - 1, b)) for a, b in edges.reshape(-1, 2)]
 
 
 def speed_edges(op: Operation, table: LoadTable, workpiece_speed: float) -> Floats:
