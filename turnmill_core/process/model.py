@@ -62,6 +62,11 @@ class ProcessModel:
     uneven: bool
     hop: int
 
+    @property
+    def raw_columns(self) -> int:
+        """Columns of the raw signals that are computed: velocities only where a channel asks for them."""
+        return len(integrator.RAW) if max(self.columns) >= integrator.FIRST_VELOCITY else integrator.FIRST_VELOCITY
+
 
 def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     """Arrays of `op` for the integrator.

@@ -95,7 +95,7 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, integrator.KNOT_COLUMNS)),
         arcs=np.zeros((0, model.slices, ARCS, 2)), modal=start,
         force=np.zeros(integrator.LOADS), scalars=np.zeros(integrator.SCALARS), surface=surface,
-        rows=np.zeros((half, len(integrator.RAW))), next_sample=0,
+        rows=np.zeros((half, model.raw_columns)), next_sample=0,
         samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
         marks=np.zeros((0, 4)), first_mark_skip=-1,
     )
@@ -175,7 +175,7 @@ def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationSta
     """State at the first axis state: angles set, one row of raw signals at time 0."""
     next_mark = math.floor(first[integrator.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
     scalars = np.array([first[integrator.TOOL_ANGLE], 0.0, max(0.0, first[integrator.DEPTH]), 0.0, next_mark])
-    row = np.zeros((1, len(integrator.RAW)))
+    row = np.zeros((1, state.model.raw_columns))
     row[0, 0] = first[integrator.TOOL_ANGLE]
     modes = state.model.modes
     for side, column in ((1.0, 2), (-1.0, 5)):
@@ -198,7 +198,7 @@ def _integrate(
     while end * dt > last:
         end -= 1
     count = max(0, end - state.steps) if len(knots) > 1 else 0
-    raw = np.empty((count, len(integrator.RAW)))
+    raw = np.empty((count, state.rows.shape[1]))
     turned = float(knots[:, integrator.TOOL_ANGLE].max() - state.scalars[integrator.ANGLE])
     marks = np.empty((int(max(0.0, turned) * MARKS_PER_TURN / (2 * math.pi)) + count + 2, 4))
     modal, force, scalars, surface = (a.copy() for a in (state.modal, state.force, state.scalars, state.surface))

@@ -36,6 +36,7 @@ RAW = (
     "tool_velocity_z", "workpiece_velocity_x", "workpiece_velocity_y", "workpiece_velocity_z",
 )
 LOADS = 5
+FIRST_VELOCITY = RAW.index("tool_velocity_x")
 # Entries of `scalars`, carried from step to step.
 ANGLE, PSI, LAST_DEPTH, CHIP, NEXT_MARK = range(5)
 SCALARS = 5
@@ -281,9 +282,9 @@ def advance(
     per height [rad/m], longest pitch; coefficients (8,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae [N/m], process damping per
     height times the tool's speed [N/m2] and its friction [1]; contact: the tool can leave the material.
     Updated in place: modal (M, 2) displacement and velocity, force (5,) on the tool and torques, scalars (5,),
-    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 19), see RAW;
-    marks (n, 4): time, relative displacement x, y, and largest chip since the last mark, at every
-    2 pi / marks_per_turn of the tool angle.
+    surface (teeth, slices, cells, 2) [m], see _leave_surface. Written: raw (steps, 19), see RAW, 13
+    columns without velocities; marks (n, 4): time, relative displacement x, y, and largest chip since the last mark,
+    at every 2 pi / marks_per_turn of the tool angle.
     """
     mark_angle = 2.0 * math.pi / marks_per_turn
     now = np.empty(knots.shape[1])
@@ -349,13 +350,15 @@ def advance(
             raw[i, 1] += modes[m, RADIATION] * rate
             side = modes[m, SIDE]
             if side != 0.0:
-                column, velocity_column = (2, 13) if side > 0.0 else (5, 16)
+                column, velocity_column = (2, FIRST_VELOCITY) if side > 0.0 else (5, FIRST_VELOCITY + 3)
                 if modes[m, OF_VELOCITY] != 0.0:
                     q, v = (modes[m, OF_DISPLACEMENT] * q + modes[m, OF_VELOCITY] * v,
                             modes[m, OF_DISPLACEMENT] * v + modes[m, OF_VELOCITY] * rate)
                 for c in range(3):
                     raw[i, column + c] += side * modes[m, SHAPE_X + c] * q
-                    raw[i, velocity_column + c] += side * modes[m, SHAPE_X + c] * v
+                if raw.shape[1] > FIRST_VELOCITY:
+                    for c in range(3):
+                        raw[i, velocity_column + c] += side * modes[m, SHAPE_X + c] * v
         raw[i, 0] = now[TOOL_ANGLE]
         for c in range(LOADS):
             raw[i, 8 + c] = force[c]
