@@ -18,9 +18,9 @@ from turnmill_core.operation import Mode, Operation, Structure
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.operation_stability import flank_contact_length
 from turnmill_core.stability.collocation import solve
-from turnmill_core.stability.delay import mean_delay
+from turnmill_core.stability.delay import discrete_delay, mean_delay
 from turnmill_core.stability.floquet import FloquetVerdict
-from turnmill_core.stability.low_speed import envelope_from_tests
+from turnmill_core.stability.low_speed import low_speed_limits
 from turnmill_core.stability.margin import stability_margin, stability_point
 from turnmill_core.stability.problem import StabilityProblem, constant_engagement
 from turnmill_core.structure.modal import modal_model, state_space
@@ -74,11 +74,26 @@ def textbook() -> list[Row]:
 def delays() -> list[Row]:
     """Section 4.3.4."""
     pair = (math.pi, math.pi)
+    angle = np.linspace(0.0, math.pi, 721)
+    printed = discrete_delay(math.pi, 6000 * RPM, 3000 * RPM, 6e-3, 18e-3, 1e-3, angle)
+
+    def ripple(diameters: float, workpiece_rpm: float) -> float:
+        found = discrete_delay(math.pi / 2, 6000 * RPM, workpiece_rpm * RPM, 6e-3, diameters * 6e-3, 1e-3, angle)
+        return float(np.ptp(found) / found.mean()) * 100
+
     slow, fast = (mean_delay(pair, 3350 * RPM, w * RPM)[0] for w in (6, 21))
     return [
         Row("delay at 6000 and 3000 rpm", "Figure 4.28", "7.48 to 7.51",
             mean_delay(pair, 6000 * RPM, 3000 * RPM)[0] * 1e3, "ms",
             "erratum D1: two teeth, not Table 4.3's four; the mean is Td (1 + 1/2)"),
+        Row("largest discrete delay as printed, 6000 and 3000 rpm", "Figure 4.28", 7.51, printed.max() * 1e3, "ms",
+            "Eq. 4.81-4.83 as printed, Table 4.3's diameters and depth, two teeth"),
+        Row("smallest discrete delay as printed, 6000 and 3000 rpm", "Figure 4.28", 7.48, printed.min() * 1e3, "ms",
+            "the same; with matching points there is no ripple (erratum D1)"),
+        Row("ripple of the printed discrete delay, diameters 2, speeds 4", "section 4.3.4.2", 1.5,
+            ripple(2.0, 1500), "%", "of the mean, four teeth; with matching points zero (erratum D1)"),
+        Row("ripple of the printed discrete delay, diameters 8.33, speeds 2", "section 4.3.4.2", 0.2,
+            ripple(8.33, 3000), "%", "the text says not more than that"),
         Row("change of the delay, 6 to 21 rpm", "section 4.3.7.3", 4.0, (fast / slow - 1) * 100, "%",
             "erratum D2: not what Eq. 4.88 gives"),
     ]
@@ -103,12 +118,12 @@ def asymmetric_verdict(rotating: bool) -> FloquetVerdict:
 
 def asymmetric_cutter() -> list[Row]:
     """Section 4.2.3, point A of Figure 4.7."""
-    spindle, tooth, at = 16245 / 60, 2 * 16245 / 60, "Figure 4.7, point A"
-    dominant = asymmetric_verdict(True).chatter_frequency - spindle
-    why = "line in the tool's frame minus the spindle's; Coriolis as printed, tool-fixed damping, no helix"
+    at = "Figure 4.7, point A"
+    lines = sorted(line.frequency for line in asymmetric_verdict(True).lines[:3])
+    why = "the three strongest lines seen from the machine; Coriolis as printed, tool-fixed damping, no helix"
     return [
-        *(Row(f"chatter line {q:+d}", at, published, dominant + q * tooth, "Hz", why)
-          for q, published in ((-1, 2509), (0, 3052), (1, 3592))),
+        *(Row(f"chatter line {q:+d}", at, published, line, "Hz", why)
+          for q, published, line in zip((-1, 0, 1), (2509, 3052, 3592), lines, strict=True)),
         Row("spectral radius, rotating frame", at, "chatter", asymmetric_verdict(True).spectral_radius, "1",
             "per spindle revolution"),
         Row("spectral radius, fixed frame", at, "predicted stable", asymmetric_verdict(False).spectral_radius, "1",
@@ -143,7 +158,8 @@ def case_2() -> list[Row]:
 
 def aisi_620() -> list[Row]:
     """Table 4.11, without process damping."""
-    op, at = load("thesis_table_4_11"), "Figure 4.64"
+    at = "Figure 4.64"
+    op = dataclasses.replace(load("thesis_table_4_11"), process_damping=None)
     point = stability_point(flat(op), with_cut(flat(op), tool_speed=2070 * RPM, workpiece_speed=6 * RPM, depth=2.2e-3))
     return [
         Row("lowest depth limit, 1500 to 3000 rpm", at, 0.3,
@@ -155,12 +171,19 @@ def aisi_620() -> list[Row]:
 
 def low_speed() -> list[Row]:
     """Section 4.3.5."""
-    found = envelope_from_tests((2070 * RPM, 0.4e-3), (1625 * RPM, 0.5e-3), 8 / 20)
-    at = "section 4.3.7.3"
+    found_here = low_speed_limits(load("thesis_table_4_11"), [600 * RPM], 8e-3)
+    found, at = found_here.envelope, "section 4.3.7.3"
+    assert found is not None
     return [
         Row("limit of the envelope", at, 0.15, found.depth_limit * 1e3, "mm",
             "erratum D5: the text's numbers do not return its own two tests"),
         Row("asymptotic speed of the envelope", at, 1147, found.asymptotic_speed / RPM, "rpm", "erratum D5"),
+        Row("ploughing coefficient K_rp of the envelope", at, "no unit fits", found_here.ploughing, "N/m",
+            "Eq. 4.119 solved for it with 264.6 Hz"),
+        Row("lowest limit with process damping, 600 rpm", at, "above all",
+            float(found_here.damped[0]) * 1e3, "mm", "Ksp 2.69e13 N/m3; up to 8 mm; without damping the next row"),
+        Row("lowest limit without process damping, 600 rpm", at, "about 0.3", float(found_here.undamped[0]) * 1e3,
+            "mm", "not reproduced: see the lowest depth limit; round bar"),
         Row("contact length of the flank", at, "0.028 m",
             flank_contact_length(60e-6, math.radians(50), math.radians(5)) * 1e6, "um",
             "erratum D6: Eq. 4.72 with 60 um, 50 and 5 degrees"),

@@ -7,8 +7,10 @@ import pytest
 
 from tests.stability.cases import textbook
 from turnmill_core.operation import Mode
+from turnmill_core.prediction import PredictedType
+from turnmill_core.stability import collocation
 from turnmill_core.stability.collocation import leading_multiplier
-from turnmill_core.stability.zero_order import zero_order_limit
+from turnmill_core.stability.zero_order import solve, zero_order_limit
 from turnmill_core.structure.rotating import rotating_structure
 
 
@@ -41,3 +43,40 @@ def test_delays_that_differ_are_refused() -> None:
     problem = textbook(1e-4)
     with pytest.raises(ValueError, match="delay"):
         zero_order_limit(problem.at(delays=(problem.delays[0], 1.1 * problem.delays[0])))
+
+
+@pytest.mark.parametrize("damping", [(0.0, 0.0), (2e4, 0.3)])
+@pytest.mark.parametrize("depth", [0.1e-3, 0.4e-3])
+def test_the_verdict_is_exact_where_the_matrix_is_constant(depth: float, damping: tuple[float, float]) -> None:
+    """Four straight teeth in a slot: the same multipliers and frequencies as the fast solver."""
+    problem = textbook(depth, rpm=6000, teeth=4, axes=2, process_damping=damping)
+    zero, fast = solve(problem), collocation.solve(problem, 3.1e-6)
+    assert zero.spectral_radius == pytest.approx(fast.spectral_radius, abs=2e-6)
+    assert zero.predicted_type is fast.predicted_type
+    assert zero.lines[0].frequency == pytest.approx(fast.lines[0].frequency, abs=0.01)
+
+
+@pytest.mark.parametrize("change", [{}, {"exit": np.pi / 2}, {"exit": 1.2, "shift": 0.05}])
+def test_the_verdict_turns_at_the_limit(change: dict[str, float]) -> None:
+    problem = textbook(1e-4, rpm=9000, axes=2, **change)  # type: ignore[arg-type]
+    limit = zero_order_limit(problem)
+    low, at, high = (solve(textbook(f * limit.depth, rpm=9000, axes=2, **change)) for f in (0.99, 1.0, 1.01))  # type: ignore[arg-type]
+    assert at.spectral_radius == pytest.approx(1.0, abs=1e-7)
+    assert at.lines[0].frequency == pytest.approx(limit.frequency, abs=0.01)
+    assert (low.predicted_type, high.predicted_type) == (PredictedType.STABLE, PredictedType.HOPF)
+
+
+def test_the_verdict_is_the_same_in_both_frames() -> None:
+    fixed = textbook(0.2e-3, rpm=9000, teeth=3, axes=2)
+    mode = Mode(922.0, 0.011, 0.03993, (1, 0, 0))
+    rotating = fixed.at(structure=rotating_structure(mode, mode, fixed.tool_speed, "printed", "machine"), rotating=True)
+    one, two = solve(fixed), solve(rotating)
+    assert two.spectral_radius == pytest.approx(one.spectral_radius**3, rel=1e-7)
+    assert two.lines[0].frequency == pytest.approx(one.lines[0].frequency, abs=0.01)
+
+
+def test_process_damping_has_no_limit_but_a_verdict() -> None:
+    with pytest.raises(ValueError, match="process damping"):
+        zero_order_limit(textbook(1e-4, process_damping=(1e4, 0.3)))
+    bare, damped = (solve(textbook(0.4e-3, process_damping=d)).spectral_radius for d in ((0.0, 0.0), (1e4, 0.3)))
+    assert damped < bare

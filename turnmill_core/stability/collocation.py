@@ -28,7 +28,7 @@ from turnmill_core.stability._kernels import cut, operators, spectrum
 from turnmill_core.stability._kernels.cut import MOST_NODES
 from turnmill_core.stability.floquet import FloquetVerdict, verdict_from_map
 from turnmill_core.stability.problem import Engagement, StabilityProblem, contact_basis
-from turnmill_core.stability.semidiscretization import PeriodMap
+from turnmill_core.stability.semidiscretization import PeriodMap, in_fixed_frame
 from turnmill_core.stability.threads import one_thread
 from turnmill_core.structure.modal import LinearStructure
 
@@ -170,7 +170,7 @@ def period_map(problem: StabilityProblem, base_nodes: float = BASE_NODES, probes
     matrix, shown = operators.dense_map(
         int(slot[-1]), outputs, nodes, slot, turn, F, K, R, free, LU, pivot, first, at, rows, seen_at, seen_rows,
         wanted)
-    return PeriodMap(matrix, problem.period, shown.reshape(probes, 2, matrix.shape[0]))
+    return PeriodMap(matrix, problem.period, in_fixed_frame(problem, shown.reshape(probes, 2, matrix.shape[0])))
 
 
 def _stiffening(problem: StabilityProblem) -> float:

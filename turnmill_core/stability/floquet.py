@@ -76,6 +76,11 @@ def kinds(leading: ArrayLike) -> NDArray[np.uint8]:
     return np.where(np.abs(mu) < 1, np.uint8(PredictedType.STABLE), unstable)
 
 
+def leading_first(multipliers: Complexes) -> NDArray[np.intp]:
+    """Order of multipliers (n,) by falling magnitude, of a pair the one with Im > 0 first."""
+    return np.lexsort((-multipliers.imag, -np.round(np.abs(multipliers), 12)))
+
+
 def classify(multipliers: ArrayLike) -> PredictedType:
     """STABLE, HOPF or FLIP from multipliers (n,), any order. Raises ``ValueError`` when one is not finite."""
     mu = np.asarray(multipliers, dtype=np.complex128)
@@ -129,8 +134,7 @@ def verdict(multipliers: ArrayLike, leading_displacement: Complexes, period: flo
     """
     mu = np.asarray(multipliers, dtype=np.complex128)
     kind = classify(mu)
-    order = np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))
-    mu = mu[order]
+    mu = mu[leading_first(mu)]
     real = np.abs(mu.imag) <= REAL_TOLERANCE * np.maximum(np.abs(mu), 1e-300)
     lines = spectrum_lines(complex(mu[0]), leading_displacement, period)
     chatter = lines[0].frequency if lines and kind is not PredictedType.STABLE else float("nan")
@@ -144,7 +148,7 @@ def verdict_from_map(matrix: Floats, displacement: Floats, period: float) -> Flo
         raise ValueError("the map over one period is not finite, expected finite numbers; take more steps")
     with one_thread():
         mu = _leading(matrix) if len(matrix) > LARGE else np.linalg.eigvals(matrix).astype(np.complex128)
-        leading = mu[np.lexsort((-mu.imag, -np.round(np.abs(mu), 12)))[0]]
+        leading = mu[leading_first(mu)[0]]
         vector = eigenvector(matrix, complex(leading))
     return verdict(mu, displacement @ vector, period)
 

@@ -15,6 +15,7 @@ the full states of Eq. 4.102; the multipliers are the same. The transition matri
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class PeriodMap:
     """Linear map of the discrete state over one principal period.
 
     matrix (L, L); period [s]; displacement (k, 3, L): displacement of the tool relative to the
-    workpiece [m], tool frame, at k equally spaced times i period / k, from the state at the start.
+    workpiece [m], tool frame (not turning), at k equally spaced times i period / k, from the state at the start.
     """
 
     matrix: Floats
@@ -59,7 +60,16 @@ def period_map(problem: StabilityProblem, steps: int | None = None, order: int =
     with one_thread():
         grid = _grid(problem, default_steps(problem) if steps is None else steps, order)
         end, observed = _march(grid, np.eye(grid.size))
-    return PeriodMap(end, problem.period, observed)
+    return PeriodMap(end, problem.period, in_fixed_frame(problem, observed))
+
+
+def in_fixed_frame(problem: StabilityProblem, observed: NDArray[Any]) -> NDArray[Any]:
+    """Displacements (k, 2 or 3, L) at equally spaced times of a period, turned back where the problem's frame turns."""
+    if problem.rotating:
+        k = len(observed)
+        T = frame_matrix(problem.tool_speed * problem.period / max(k, 1) * np.arange(k))
+        observed[:, :2] = T @ observed[:, :2]
+    return observed
 
 
 def leading_multiplier(problem: StabilityProblem, steps: int | None = None, order: int = 1) -> complex:
@@ -118,7 +128,7 @@ def _grid(problem: StabilityProblem, k: int, order: int) -> _Grid:
         raise ValueError(f"delay is {delays.min():.3g} s, expected at least one step of {dt:.3g} s; take more steps")
     basis = np.eye(2) if problem.rotating else contact_basis(problem.structure)
     A, B, C_xy = problem.structure.A, problem.structure.B, problem.structure.C[:2]
-    now = (B @ matrices.sum(axis=0)) @ C_xy + B @ _process_damping(problem, k)
+    now = (B @ matrices.sum(axis=0)) @ C_xy + B @ mean_process_damping(problem, k)
     if problem.rotating:  # the past has turned with the tool since
         turned = frame_matrix(problem.tool_speed * delays.ravel()).reshape(*delays.shape, 2, 2)
         matrices = matrices @ turned.swapaxes(2, 3)
@@ -161,7 +171,7 @@ def _per_step(problem: StabilityProblem, k: int) -> tuple[Floats, Floats]:
     return delays, matrices
 
 
-def _process_damping(problem: StabilityProblem, k: int) -> Floats:
+def mean_process_damping(problem: StabilityProblem, k: int) -> Floats:
     """Force of process damping from the state (k, 3, m), averaged over each step."""
     c, friction = problem.process_damping
     A, C = problem.structure.A, problem.structure.C[:2]
