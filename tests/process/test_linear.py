@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.process.cases import ALUMINIUM, BENCHMARK_MODE, RPM, at, exact_config, milling, run, turn_milling
-from tests.process.test_growth import CASES, leading
+from tests.process.test_growth import CASES, leading, random_cut
 from turnmill_core.cutting.forces import revolution
 from turnmill_core.operation import Material, Mode, Operation
 from turnmill_core.process._kernels.march import march
@@ -126,6 +126,22 @@ def test_perturbation_grows_as_the_multipliers_say(name: str) -> None:
     """ln|mu| over a period of the map is the stability solver's within 1 %."""
     op = CASES[name]
     assert growth(made(op, 400)) == pytest.approx(math.log(abs(leading(op))), rel=0.01)
+
+
+@pytest.mark.slow
+def test_growth_at_seeded_points() -> None:
+    """50 random cuts of bars and blocks, where |mu| is more than 0.02 from 1 and does not vanish in a period."""
+    compared: list[float] = []
+    seed = 0
+    while len(compared) < 50:
+        op = random_cut(seed)
+        seed += 1
+        expected = leading(op, 160)
+        if abs(abs(expected) - 1) < 0.02 or abs(expected) < 0.3:
+            continue
+        compared.append(growth(made(op, 320), 200) / math.log(abs(expected)) - 1)
+        print(seed - 1, f"{abs(expected):.4f}", f"{compared[-1]:.2e}")
+    assert max(map(abs, compared)) < 0.01
 
 
 def growth(step_map: LinearMap, periods: int = 60) -> float:
