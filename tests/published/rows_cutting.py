@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from tests.published.row import Row
+from turnmill_core.cutting.alloys import alloy_material, find_alloy
 from turnmill_core.cutting.bottom import bottom_loads
 from turnmill_core.cutting.chip import (
     exact_chip,
@@ -33,7 +34,7 @@ ANGLES, ELEMENTS = 1440, 200
 
 def rows() -> list[Row]:
     """Every number of thesis chapter 3 and section 5 that this room computes."""
-    return [row._replace(computed=float(row.computed)) for row in (*table_31(), *table_32(), *chapter_5())]
+    return [row._replace(computed=float(row.computed)) for row in (*table_31(), *table_32(), *section_42(), *chapter_5())]
 
 
 def load(name: str, helix_deg: float | None = None) -> Operation:
@@ -125,6 +126,18 @@ def table_32() -> list[Row]:
             why = "the helix is not given; 30 deg gives 197 N with Eq. 3.44 and 156 N with the exact chip"
             result.append(Row(f"resultant force, peak, {helix:g} deg helix{name}", at, "figure only", peak, "N", why))
     return result
+
+
+def section_42() -> list[Row]:
+    """Al7050-T7451: coefficients from orthogonal data beside those identified on a milling tool."""
+    found = alloy_material(find_alloy("Al7050-T7451"), math.radians(13.5), math.radians(25), 0.05e-3, 200 / 60)
+    why = ("identified by average forces in the thesis; computed from orthogonal tests of other bars (Merdol, Altintas "
+           "2004), rake 13.5 deg, helix 25 deg, chip 0.05 mm and 200 m/min assumed")
+    values = ((732, found.Ktc, "MPa"), (56, found.Krc, "MPa"), (220, found.Kac, "MPa"), (21.96, found.Kte, "N/mm"),
+              (23.21, found.Kre, "N/mm"), (22, found.Kae, "N/mm"))
+    return [Row(f"Al7050-T7451 {name}", "section 4.2.3", published, value * (1e-6 if unit == "MPa" else 1e-3), unit, why)
+            for name, (published, value, unit) in zip(("K_tc", "K_rc", "K_ac", "K_te", "K_re", "K_ae"), values,
+                                                      strict=True)]
 
 
 def chapter_5() -> list[Row]:

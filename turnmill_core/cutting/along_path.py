@@ -86,9 +86,10 @@ def rounded(conditions: Conditions) -> Conditions:
 class PathLoads:
     """Loads along a path at n axis states; zeros where nothing is cut, NaN where the model describes no cut.
 
-    method: `closed` or `swept`. time [s] (n,); tip [m] (n, 3), tool tip in the machine frame. Forces [N] (n, 3) on the
-    tool, mean over a revolution, in tool, machine and workpiece frame (which turns with C), and the peaks in the
-    tool frame; torques [N m] and powers [W] (n,) as in CuttingLoads, means; chip_thickness_max [m],
+    method: `closed` or `swept`. time [s] (n,); tip [m] (n, 3), tool tip in the machine frame. force_tool,
+    force_machine, force_workpiece [N] (n, 3), on the tool, means over a revolution, in tool, machine and workpiece
+    frame (which turns with C); force_tool_peak [N] (n, 3), largest magnitudes, signed. tool_torque,
+    workpiece_torque [N m], tool_power, workpiece_power [W] (n,), means, as in CuttingLoads; chip_thickness_max [m],
     removal_rate [m3/s], bottom_share [1] (n,); in_cut (n,). refused: state and reason where there is no
     prediction.
     """
@@ -117,7 +118,12 @@ def loads_along(
 ) -> PathLoads:
     """Loads at each of the axis states `states`, from a workpiece that is whole at the first.
 
-    `auto` takes the closed form where it describes the operation and every one of the states.
+    Args:
+        op: the operation.
+        states: axis states in their order.
+        method: `auto` takes the closed form where it describes the operation and every one of the states.
+        bottom: add the forces of the bottom edges.
+        progress: called with the share done, 0 to 1.
     """
     if method == "auto":
         method = "closed" if has_closed_form(op) and all(_described(op, axes) for axes in states) else "swept"

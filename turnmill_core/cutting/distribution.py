@@ -15,7 +15,7 @@ def distribution(
 ) -> EdgeLoads | None:
     """Loads of the edges around the tool (bottom edges left out) over one revolution, None without contact.
 
-    Added over teeth and elements they are the forces of `cutting_loads`.
+    Added over teeth and elements they are the forces of loads.cutting_loads.
 
     Args:
         op: the operation.
@@ -25,7 +25,7 @@ def distribution(
         chip: `static` or `exact`, this only where the engagement has a closed form.
 
     Raises:
-        ValueError: what `cutting_loads` refuses.
+        ValueError: a depth beyond the flute length, or an exact chip where there is none.
     """
     if not conditions.in_cut:
         return None
