@@ -1,4 +1,4 @@
-"""Modes and limits over machine positions and along a bar, from the command line."""
+"""Modes and limits over machine positions and along a bar, and a chuck from a dummy, from the command line."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import pytest
 from turnmill_core.machine.conditions import machine_from_tool, nominal_axes
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.structure.at import plain_structures
+from turnmill_core.structure.beam import free_bar, on_chuck, receptances
+from turnmill_core.structure.profile import stock_profile
 from turnmill_ros.along import along_axis, along_bar, nominal_index, stations, with_nominal
 from turnmill_ros.bar_receptance import before_and_after
 from turnmill_ros.cli.app import run
@@ -100,3 +102,50 @@ def test_bad_requests_are_one_line(
     error = capsys.readouterr().err
     assert words in " ".join(error.split())
     assert len(error.strip().splitlines()) == 1
+
+
+def dummy_table(path: Path, noise: float = 0.0) -> Path:
+    """H11, H12, H22 of the aluminium bar on its fitted chuck, at 0 and 60 mm, with noise relative to the largest."""
+    op = read_operation(shipped_operations()["thesis_table_4_7"])
+    beam = op.workpiece.beam
+    assert beam is not None
+    f = np.arange(100.0, 1600.0, 2.0)
+    held = on_chuck(free_bar(stock_profile(op.workpiece), beam.material), beam.chuck_x)
+    H = receptances(held, np.vstack([held.row(0.0), held.row(0.06)]), f)
+    rng = np.random.default_rng(5)
+    columns, names = [f], ["frequency [Hz]"]
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        measured = H[:, i, j] + noise * np.abs(H).max() * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size))
+        columns += [measured.real, measured.imag]
+        names += [f"{i + 1}{j + 1} real [m/N]", f"{i + 1}{j + 1} imag [m/N]"]
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.12e")
+    return path
+
+
+def test_a_chuck_from_a_dummy_becomes_an_operation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The printed chuck's file becomes the fitted one's."""
+    out, page = tmp_path / "mine.yaml", tmp_path / "chuck.html"
+    assert run(["chuck", str(dummy_table(tmp_path / "dummy.csv")), "thesis_table_4_6", "--points", "0mm,60mm",
+                "--write", str(out), "--report", str(page), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["deviation"] < 1e-3
+    found, wanted = (read_operation(p).workpiece.beam for p in (out, shipped_operations()["thesis_table_4_7"]))
+    assert found is not None
+    assert wanted is not None
+    mode, true = found.chuck_x.modes[0], wanted.chuck_x.modes[0]
+    for name in ("frequency", "damping", "mass", "pivot"):
+        assert getattr(mode, name) == pytest.approx(getattr(true, name), rel=1e-3), name
+    assert found.chuck_x.rotational_stiffness == pytest.approx(6.5e5, rel=1e-3)
+    assert found.chuck_y != wanted.chuck_y
+    assert "Receptance of the chuck" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["thesis_table_4_9"], "beam is missing"), (["thesis_table_4_7", "--points", "0mm"], "--points"),
+    (["thesis_table_4_7", "--points", "0mm,0mm"], "different places"),
+    (["thesis_table_4_7", "--band", "1Hz..2Hz"], "16 frequencies"),
+])
+def test_bad_dummies_are_one_line(
+    tmp_path: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["chuck", str(dummy_table(tmp_path / "dummy.csv")), *arguments]) == 2
+    assert words in " ".join(capsys.readouterr().err.split())

@@ -11,7 +11,7 @@ from turnmill_ros.cli import app
 from turnmill_ros.cli.app import run
 
 COMMANDS = ("doctor", "operation", "simulate", "import", "replay", "analyze", "live", "stability", "forces", "recover",
-            "toolpath", "identify", "lobes", "delay", "plan", "modes", "positions", "workpiece")
+            "toolpath", "identify", "lobes", "delay", "plan", "modes", "positions", "workpiece", "chuck")
 
 
 def ask(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

@@ -16,7 +16,7 @@ UNITS = {"m/N": (0, 1.0), "mm/N": (0, 1e-3), "um/N": (0, 1e-6), "m/s/N": (1, 1.0
          "m/s2/N": (2, 1.0), "m/s^2/N": (2, 1.0), "g/N": (2, 9.80665)}
 """Unit of a response: how often it is differentiated, and its size in SI."""
 _ORDINATE = {8: 0, 11: 1, 12: 2}
-_COLUMN = re.compile(r"(?P<pair>[xyz]{2})[ _](?P<part>real|re|imag|im|magnitude|mag|phase)", re.IGNORECASE)
+_COLUMN = re.compile(r"(?P<pair>[xyz]{2}|[12]{2})[ _](?P<part>real|re|imag|im|magnitude|mag|phase)", re.IGNORECASE)
 _PARTS = {"re": "real", "im": "imag", "mag": "magnitude"}
 
 
@@ -24,8 +24,8 @@ _PARTS = {"re": "real", "im": "imag", "mag": "magnitude"}
 class FrfFile:
     """Receptances at one point.
 
-    frequency (k,) [Hz], evenly spaced, > 0; pairs: direction of response and of force, "xx", "xy", ...; receptance
-    (n, k) [m/N]; notes: what was done on reading.
+    frequency (k,) [Hz], evenly spaced, > 0; pairs: direction of response and of force, "xx", "xy", ..., or their points
+    "11", "12", "22"; receptance (n, k) [m/N]; notes: what was done on reading.
     """
 
     frequency: NDArray[np.float64]

@@ -71,3 +71,15 @@ def with_structure(operation: Operation, holder: str, section: dict[str, Any], s
     document["sources"] = f"{document.get('sources', '').rstrip()}\n{source}\n".lstrip()
     return parse_operation(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100),
                            f"{operation.name} with other modes")
+
+
+def with_chuck(operation: Operation, plane: str, section: dict[str, Any], source: str) -> Operation:
+    """The operation with another chuck of its bar in `plane`, x or y; `source` is added to its sources.
+
+    Raises OperationError where the section is not one.
+    """
+    document: dict[str, Any] = yaml.safe_load(operation.text)
+    document["workpiece"]["beam"][f"chuck_{plane}"] = section
+    document["sources"] = f"{document.get('sources', '').rstrip()}\n{source}\n".lstrip()
+    return parse_operation(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100),
+                           f"{operation.name} with another chuck")

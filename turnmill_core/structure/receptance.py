@@ -18,6 +18,9 @@ from turnmill_core.operation_structure import Chuck, ChuckMode
 from turnmill_core.structure.beam import PlaneModel, free_receptances
 from turnmill_core.structure.modal import Complexes, Floats
 
+RIGID = 1e4
+"""A fitted joint this much stiffer than the whole dummy counts as rigid."""
+
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
@@ -117,6 +120,22 @@ def seated_receptances(bar: PlaneModel, rows: ArrayLike, base: Complexes, freque
     return np.asarray(A + T @ base @ np.linalg.solve(np.eye(2) + Z @ base, T.swapaxes(1, 2)))
 
 
+def _dummy(
+    bar: PlaneModel, points: tuple[float, float], frequency: ArrayLike, H11: ArrayLike, H12: ArrayLike, H22: ArrayLike,
+) -> tuple[Floats, tuple[Complexes, Complexes, Complexes], Complexes]:
+    """Frequencies [Hz], the dummy as _seat sees it, and its measured receptances (k, 2, 2), checked."""
+    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    measured = [np.asarray(H, dtype=np.complex128) for H in (H11, H12, H22)]
+    require(bool(np.all(f > 0)), "dummy FRF frequency", float(f.min()), "Hz", "values > 0")
+    for name, H in zip(("H11", "H12", "H22"), measured, strict=True):
+        require(H.shape == f.shape and bool(np.all(np.isfinite(H))), name, H.shape, "",
+                f"{f.size} finite complex values")
+    require(abs(points[0] - points[1]) > 1e-3 * bar.nodes[-1], "measured points", points, "m",
+            "two different places on the dummy")
+    H = np.stack([np.stack([measured[0], measured[1]], -1), np.stack([measured[1], measured[2]], -1)], -2)
+    return f, _seat(bar, np.vstack([bar.row(points[0]), bar.row(points[1])]), f), H
+
+
 def chuck_from_dummy(
     bar: PlaneModel, points: tuple[float, float], frequency: ArrayLike, H11: ArrayLike, H12: ArrayLike, H22: ArrayLike,
 ) -> Complexes:
@@ -127,49 +146,44 @@ def chuck_from_dummy(
     differences: `seated_receptances` backwards, G = T^-1 (H - A) T^-T, R = (1 - G Z)^-1 G. Raises ``ValueError`` where
     the points do not tell rotation from displacement.
     """
-    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    measured = [np.asarray(H, dtype=np.complex128) for H in (H11, H12, H22)]
-    require(bool(np.all(f > 0)), "dummy FRF frequency", float(f.min()), "Hz", "values > 0")
-    for name, H in zip(("H11", "H12", "H22"), measured, strict=True):
-        require(H.shape == f.shape and bool(np.all(np.isfinite(H))), name, H.shape, "",
-                f"{f.size} finite complex values")
-    require(abs(points[0] - points[1]) > 1e-3 * bar.nodes[-1], "measured points", points, "m",
-            "two different places on the dummy")
-    A, T, Z = _seat(bar, np.vstack([bar.row(points[0]), bar.row(points[1])]), f)
-    H = np.stack([np.stack([measured[0], measured[1]], -1), np.stack([measured[1], measured[2]], -1)], -2)
+    _, (A, T, Z), H = _dummy(bar, points, frequency, H11, H12, H22)
     left = np.linalg.solve(T, H - A)
     G = np.linalg.solve(T, left.swapaxes(1, 2))
     return np.asarray(np.linalg.solve(np.eye(2) - G @ Z, G))
 
 
-def fit_chuck(frequency: ArrayLike, receptance: Complexes) -> Chuck:
-    """One mode of the face and a joint that come nearest to a chuck's receptance (k, 2, 2) at `frequency` [Hz] (k,).
+def fit_chuck(
+    bar: PlaneModel, points: tuple[float, float], frequency: ArrayLike, H11: ArrayLike, H12: ArrayLike, H22: ArrayLike,
+) -> Chuck:
+    """One mode of the face and a joint with which the dummy comes nearest to its measured FRFs.
 
-    Least squares of the relative deviation of displacement, cross and rotation receptances. Raises ``ValueError`` where
-    no mode is within the frequencies.
+    Arguments and errors as chuck_from_dummy. Least squares of the deviation relative to each FRF, from several
+    starting frequencies; the noise of the measurement is not sent through the decoupling.
     """
-    f = np.asarray(frequency, dtype=np.float64)
-    H = receptance[:, 0, 0]
-    peak = int(np.argmax(np.abs(H)))
-    require(0 < peak < f.size - 1, "chuck FRF", float(f[peak]), "Hz", "a peak within the measured frequencies")
-    wide = f[np.abs(H) > np.abs(H[peak]) / np.sqrt(2)]
-    damping = min(max((wide.max() - wide.min()) / (2 * f[peak]), 1e-4), 0.5)
-    w = 2 * np.pi * f[peak]
-    turn = float(np.real(receptance[peak, 1, 0] / H[peak]))
-    stiff = 1 / max(float(np.median(np.abs(receptance[:, 1, 1]))), 1e-12)
-    size = np.median(np.abs(receptance), axis=0)
+    f, (A, T, Z), H = _dummy(bar, points, frequency, H11, H12, H22)
+    size = np.abs(H) + 0.02 * np.abs(H).max(axis=0)
+    low, length = float(np.abs(H[0, 1, 1])), float(bar.nodes[-1])
 
     def chuck_of(x: Floats) -> Chuck:
         pivot = -1 / x[3] if x[3] < -1e-9 else math.inf
+        across, around = math.exp(min(x[4], 60.0)), math.exp(min(x[5], 60.0))
+        rigid = across * low > RIGID, around * low > RIGID * length**2
         return Chuck((ChuckMode(math.exp(x[0]), min(math.exp(x[1]), 0.99), math.exp(x[2]), pivot),),
-                     math.exp(x[4]), math.exp(x[5]), math.exp(x[4]) * abs(x[6]), math.exp(x[5]) * abs(x[7]))
+                     math.inf if rigid[0] else across, math.inf if rigid[1] else around,
+                     0.0 if rigid[0] else across * abs(x[6]), 0.0 if rigid[1] else around * abs(x[7]))
 
     def deviation(x: Floats) -> Floats:
-        off = (chuck_receptance(chuck_of(x), f) - receptance) / (np.abs(receptance) + 0.05 * size)
+        base = chuck_receptance(chuck_of(x), f)
+        off = (A + T @ base @ np.linalg.solve(np.eye(2) + Z @ base, T.swapaxes(1, 2)) - H) / size
         flat = off[:, [0, 0, 1], [0, 1, 1]].ravel()
         return np.concatenate([flat.real, flat.imag])
 
-    start = [math.log(f[peak]), math.log(damping), -math.log(abs(H[peak]) * 2 * damping * w**2), min(turn, -1e-3),
-             math.log(1e3 / abs(H[0])), math.log(stiff), 1e-6, 1e-6]
-    found = least_squares(deviation, start, x_scale=[0.01, 0.1, 0.1, 1.0, 1.0, 0.3, 1e-5, 1e-5], loss="soft_l1")
-    return chuck_of(found.x)
+    scale = [0.05, 0.3, 0.3, 1.0, 1.0, 0.5, 1e-5, 1e-5]
+    found = []
+    for start in np.geomspace(1.2 * f[0], 0.8 * f[-1], 8):
+        mass = 1 / (low * (2 * np.pi * start) ** 2)
+        x = [math.log(start), math.log(0.03), math.log(mass), -1.0, math.log(30 / low), math.log(3 * length**2 / low),
+             1e-6, 1e-6]
+        found.append(least_squares(deviation, x, x_scale=scale, loss="soft_l1", max_nfev=60))
+    best = min(found, key=lambda r: r.cost)
+    return chuck_of(least_squares(deviation, best.x, x_scale=scale, loss="soft_l1", max_nfev=400).x)

@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 
 from turnmill_ros.cli import (
+    chuck,
     delay,
     detect_bench,
     forces,
@@ -42,7 +43,7 @@ app = typer.Typer(
 )
 for module in (
     model, forces, identify, modes, vibration, surface, stability, lobes, delay, recordings, online,
-    toolpath, plan, positions, workpiece, detect_bench,
+    toolpath, plan, positions, workpiece, chuck, detect_bench,
 ):
     module.register(app)
 
