@@ -49,14 +49,14 @@ def flank_contact_length(hone_radius: float, separation_angle: float, clearance_
 class Trial:
     """One cut that was made, and what came of it.
 
-    tool_speed, workpiece_speed [rad/s]; depth [m]; outcome; chatter_frequency [Hz], NaN where none was reported; note.
+    tool_speed, workpiece_speed [rad/s]; depth [m]; outcome; chatter_frequency [Hz], None where none was reported; note.
     """
 
     tool_speed: float
     workpiece_speed: float
     depth: float
     outcome: Outcome
-    chatter_frequency: float = math.nan
+    chatter_frequency: float | None = None
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -65,5 +65,5 @@ class Trial:
         positive("trial depth", self.depth, "m")
         require(self.outcome in ("stable", "marginal", "chatter"), "trial outcome", self.outcome, "",
                 "stable, marginal or chatter")
-        require(math.isnan(self.chatter_frequency) or self.chatter_frequency > 0, "trial chatter frequency",
+        require(self.chatter_frequency is None or self.chatter_frequency > 0, "trial chatter frequency",
                 self.chatter_frequency, "Hz", "a number > 0")

@@ -71,4 +71,4 @@ def trials_of(sections: tuple[TrialSection, ...], workpiece_speed: float) -> tup
     """The values of the sections; workpiece_speed [rad/s]: of those that name none."""
     return tuple(
         Trial(t.tool_speed, workpiece_speed if t.workpiece_speed is None else t.workpiece_speed, t.depth, t.outcome,
-              math.nan if t.chatter_frequency is None else t.chatter_frequency, t.note) for t in sections)
+              t.chatter_frequency, t.note) for t in sections)

@@ -6,6 +6,7 @@ import math
 
 from .operation import Operation
 from .operation_limits import NO_LIMITS, Limits
+from .operation_sensors import Sensors
 from .operation_structure_table import beam_rows, structure_rows
 
 Rows = list[tuple[str, str]]
@@ -51,10 +52,12 @@ def describe(op: Operation) -> list[tuple[str, Rows]]:
     if op.trials:
         sections.append(("trials", [
             (f"tool {_rpm(t.tool_speed)}, workpiece {_rpm(t.workpiece_speed)}, {_mm(t.depth)}",
-             t.outcome + ("" if math.isnan(t.chatter_frequency) else f" at {t.chatter_frequency:g} Hz")
+             t.outcome + ("" if t.chatter_frequency is None else f" at {t.chatter_frequency:g} Hz")
              + (f" ({t.note})" if t.note else "")) for t in op.trials]))
     if op.limits != NO_LIMITS:
         sections.append(("limits", _limit_rows(op.limits)))
+    if op.sensors.channels:
+        sections.append(("sensors", _sensor_rows(op.sensors)))
     if op.schedule:
         points = [
             (f"{p.time:.6g} s", f"tool {_rpm(p.tool_speed)}, "
@@ -112,3 +115,20 @@ def _derived_rows(op: Operation) -> Rows:
         ("feed speed", f"{cut.feed_speed * 6e4:.6g} mm/min"),
         ("resultant feed per tooth", _mm(cut.resultant_feed_speed / (turns * tool.teeth))),
     ]
+
+
+_SENSITIVITY = {"fibre probe": (1e-3, "mV/um"), "microphone": (1e3, "mV/Pa"), "accelerometer": (1e3, "mV*s^2/m"),
+                "dynamometer": (1e3, "mV/N")}
+
+
+def _sensor_rows(sensors: Sensors) -> Rows:
+    rows: Rows = []
+    for s in sensors.channels:
+        factor, unit = _SENSITIVITY[s.kind]
+        shape = f", shape {100 * s.shape:.4g} %" if s.kind == "fibre probe" else ""
+        rows.append((s.name, f"{s.kind} along {s.direction}, {s.sensitivity * factor:.4g} {unit}, "
+                             f"{s.offset:g} V at zero, {s.lowest:g} to {s.highest:g} V{shape}"))
+    if sensors.fixture is not None:
+        f = sensors.fixture
+        rows.append(("fixture", f"{f.frequency:g} Hz, {100 * f.damping:g} %, {f.cross_talk * 1e6:.4g} um/N"))
+    return rows

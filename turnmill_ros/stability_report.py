@@ -83,5 +83,5 @@ def delay_report(
     report.write_page(output, f"turnmill delay: {op.name}", head, plots, [report.operation_tables(op)])
 
 
-def _hertz(frequency: float) -> str:
-    return "" if math.isnan(frequency) else f"{frequency:.1f}"
+def _hertz(frequency: float | None) -> str:
+    return "" if frequency is None or math.isnan(frequency) else f"{frequency:.1f}"

@@ -157,7 +157,8 @@ def low_speed_limits(
         envelope = envelope_from_tests(
             (tests[0].tool_speed, tests[0].depth), (tests[1].tool_speed, tests[1].depth), immersion)
         low, high = (math.acos(max(-1.0, min(1.0, y / op.tool.radius))) for y in reversed(cut.cross_feed_span))
-        frequency = 0.5 * (tests[0].chatter_frequency + tests[1].chatter_frequency)
-        ploughing = ploughing_coefficient(
-            envelope, frequency, (op.material.Ktc, op.material.Krc), high - low, op.tool.diameter)
+        heard = [t.chatter_frequency for t in tests if t.chatter_frequency is not None]
+        if heard:
+            ploughing = ploughing_coefficient(envelope, sum(heard) / len(heard), (op.material.Ktc, op.material.Krc),
+                                              high - low, op.tool.diameter)
     return LowSpeed(np.asarray(tool_speeds, dtype=np.float64), undamped, damped, envelope, ploughing, immersion)
