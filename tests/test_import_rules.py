@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 CORE_LIBRARIES = {"numpy", "scipy", "numba"}
 OPERATION_LIBRARIES = {"yaml", "pydantic", "pydantic_core", "pint"}  # operation_file and its helpers
 # What every room of the core may use are the values; beyond them, one way:
-VALUES = {"operation", "prediction"}
+VALUES = {"operation", "prediction", *(f"operation_{part}" for part in (
+    "checks", "cutter", "limits", "sensors", "stability", "structure"))}
 ROOMS: dict[str, set[str]] = {
     "machine": set(),
     "cutting": {"machine"},
@@ -97,7 +98,8 @@ def _core_breaches(module: str, name: str, top: str) -> list[str]:
         if here in ROOMS:
             allowed = VALUES | ROOMS[here] | {here}
         elif family(here) == "operation":
-            allowed = {there} if family(there) == "operation" and here != "operation" else set()
+            known = family(there) == "operation" and (here not in VALUES or there in VALUES)
+            allowed = {there} if known else set()
         elif here == "prediction":
             allowed = {"operation"}
         else:

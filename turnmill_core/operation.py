@@ -18,6 +18,7 @@ from typing import Literal
 from .operation_checks import finite, not_negative, positive, require
 from .operation_cutter import CYLINDER, Outline, Shape, check_shape, outline, require_bar_profile
 from .operation_limits import NO_LIMITS, Limits
+from .operation_sensors import NO_SENSORS, Sensors
 from .operation_stability import ProcessDamping, Trial
 from .operation_structure import RIGID, RIGID_IN_MACHINE, Beam, Frame, Mode, Structure, Vector, check_beam
 
@@ -222,8 +223,8 @@ class Operation:
     other is 0. milling_sense: "up", "down", "slot" or "centred". schedule: what a simulated
     controller runs, at least two points, or empty (then the nominal cut is held).
     limits: what machine, tool and part allow. process_damping: of the flank.
-    trials: cuts that were made. sources: where the numbers come from. text, sha256: the
-    file it was read from, byte for byte.
+    trials: cuts that were made. sensors: calibration of channels in volts. sources: where the numbers
+    come from. text, sha256: the file it was read from, byte for byte.
     """
 
     name: str
@@ -242,6 +243,7 @@ class Operation:
     limits: Limits = NO_LIMITS
     process_damping: ProcessDamping | None = None
     trials: tuple[Trial, ...] = ()
+    sensors: Sensors = NO_SENSORS
     sources: str = ""
     text: str = field(default="", repr=False, compare=False)
     sha256: str = ""

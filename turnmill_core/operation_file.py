@@ -35,6 +35,7 @@ from .operation_schema import (
     TurnMillingFile,
     operation_schema,
 )
+from .operation_sensors_schema import sensors_of
 from .operation_stability_schema import process_damping_of, trials_of
 from .operation_structure import RIGID, RIGID_IN_MACHINE
 from .operation_structure_schema import structure_of
@@ -206,13 +207,14 @@ def _operation(model: TurnMillingFile | MillingFile, file: str, text: str, sha25
     ))
     material = built("material", lambda: material_of(model.material, tool, conditions))
     limits = built("limits", lambda: limits_of(model.limits))
+    sensors = built("sensors", lambda: sensors_of(model.sensors))
     damping = built("process_damping", lambda: process_damping_of(model.process_damping))
     trials = built("trials", lambda: trials_of(model.trials, workpiece_speed))
     return built("", lambda: Operation(
         name=model.name, process=model.process, machine=model.machine, tool=tool, workpiece=workpiece,
         material=material, conditions=conditions, milling_sense=cut.sense, axial_feed=axial_feed,
         feed_per_tooth=feed_per_tooth, eccentricity=eccentricity, tilt=tilt, schedule=points, limits=limits,
-        process_damping=damping, trials=trials, sources=model.sources, text=text, sha256=sha256,
+        process_damping=damping, trials=trials, sensors=sensors, sources=model.sources, text=text, sha256=sha256,
     ))
 
 

@@ -38,6 +38,7 @@ hertz = 1 / second = Hz
 newton = 1000 * gram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 watt = newton * meter / second = W
+volt = [voltage] = V
 """
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -88,6 +89,12 @@ KINDS = {
         Kind("a rotational damping", "N*m*s/rad", "20 N*m*s/rad"),
         Kind("a density", "kg/m^3", "2700 kg/m^3"),
         Kind("a rotation per displacement", "rad/m", "30 rad/m"),
+        Kind("a compliance", "m/N", "0.02 um/N"),
+        Kind("a voltage", "V", "2.5 V"),
+        Kind("a sensitivity to displacement", "V/m", "5.8 mV/um"),
+        Kind("a sensitivity to sound", "V/Pa", "50 mV/Pa"),
+        Kind("a sensitivity to acceleration", "V*s^2/m", "10.2 mV*s^2/m"),
+        Kind("a sensitivity to force", "V/N", "2 mV/N"),
     )
 }
 """Quantities by SI unit. The unit "%" stands for a ratio and is stored as the plain ratio."""

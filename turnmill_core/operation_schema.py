@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from .operation_cutter_schema import ProfilePoint, ShapeSection
 from .operation_limits_schema import LimitsSection
+from .operation_sensors_schema import SensorsSection
 from .operation_stability_schema import ProcessDampingSection, TrialSection
 from .operation_structure_schema import BeamSection, StructureSection
 from .operation_units import (
@@ -162,6 +163,7 @@ class _Common(Section):
         None, description="damping by the flank at low cutting speed; none if left out")
     trials: tuple[TrialSection, ...] = Field((), description="cuts that were made, shown beside computed stability")
     limits: LimitsSection | None = Field(None, description="what machine, tool and part allow; no limits if left out")
+    sensors: SensorsSection | None = Field(None, description="calibration of channels in volts; none if left out")
 
 
 class TurnMillingFile(_Common):

@@ -64,6 +64,8 @@ JointDamping = Annotated[float, _Unit("N*s/m", "not negative")]
 RotationalDamping = Annotated[float, _Unit("N*m*s/rad", "not negative")]
 Density = Annotated[float, _Unit("kg/m^3", "positive")]
 Twist = Annotated[float, _Unit("rad/m")]
+Compliance = Annotated[float, _Unit("m/N", "positive")]
+Voltage = Annotated[float, _Unit("V")]
 
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

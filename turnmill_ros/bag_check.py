@@ -11,6 +11,7 @@ import numpy as np
 
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.monitoring.blocks import SensorBlock, Status
+from turnmill_core.monitoring.sensors import PLAUSIBLE
 from turnmill_core.operation import Operation
 from turnmill_ros import topics as table
 from turnmill_ros.bag_read import BagInfo, TopicInfo, bag_info, read_bag
@@ -25,9 +26,6 @@ UNITS = {
     "voltage": "V",
 }
 """SI unit of every quantity that a sensor channel may have; "1" says that the scale is unknown."""
-
-PLAUSIBLE = {"Pa": 1e3, "m": 1e-2, "m/s2": 1e5, "N": 1e5, "N m": 1e4, "W": 1e6, "V": 1e3}
-"""Largest magnitude that a sensor of a machine tool gives, by unit; beyond it the unit is likely wrong."""
 
 MAX_TRAVEL = 20.0
 """Largest plausible coordinate of a linear axis [m]."""

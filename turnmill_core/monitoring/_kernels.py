@@ -96,8 +96,8 @@ def distance(frequency: float, first: float, spacing: float) -> float:
 @njit(cache=True)
 def family_sums(frequency: Floats, energy: Floats, first: float, tooth: float, spindle: float,
                 tolerance: float) -> tuple[NDArray[np.bool_], float, float]:
-    """Which lines (n,) lie at |first + i tooth|; energy of those and of the ones of 2 and 3 first; and that with the lines
-    at |first + i spindle|. All frequencies and the tolerance in Hz.
+    """Which lines (n,) lie at |first + i tooth|; energy of those and of the ones of 2 and 3 first; and that with the
+    lines at |first + i spindle|. All frequencies and the tolerance in Hz.
     """
     own = np.zeros(len(frequency), dtype=np.bool_)
     multiples = explained = 0.0

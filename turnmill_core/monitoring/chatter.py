@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.monitoring.config import ChatterConfig, config_from_operation
+from turnmill_core.monitoring.sensors import calibrate
 from turnmill_core.monitoring.speed import SpindleSpeed, remember
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.verdict import Reason, Verdict
@@ -62,7 +63,7 @@ def update(config: ChatterConfig, state: MonitorState, item: Item) -> tuple[Moni
     if isinstance(item, SensorBlock):
         if config.device and item.device != config.device:
             return state, ()
-        state = _add_block(config, state, item)
+        state = _add_block(config, state, calibrate(config.sensors, item))
     elif isinstance(item, SpindleSpeed):
         state = replace(state, speeds=remember(state.speeds, item))
     elif isinstance(item, Prior):

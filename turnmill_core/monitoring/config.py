@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from turnmill_core.operation import Operation, require
+from turnmill_core.operation_sensors import NO_SENSORS, Sensors
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class ChatterConfig:
     learned). gate_ratio: level over floor that shows a cut.
     enter_ratio, leave_ratio: asynchronous (or half-order) energy over total energy at which chatter
     begins and ends; an amplitude of 20 % of the synchronous one is an energy of 0.04.
+    sensors: calibration of channels in volts.
+
     enter_dwell, lone_dwell, leave_dwell, marginal_dwell, cut_dwell: windows in a row that must agree before chatter
     begins in a cut, before it begins where nothing but the chatter shows a cut, before it ends,
     before the cut is called marginal, and before the state changes between air and cut.
@@ -60,6 +63,7 @@ class ChatterConfig:
     leave_dwell: int = 2
     marginal_dwell: int = 3
     cut_dwell: int = 2
+    sensors: Sensors = NO_SENSORS
 
     def __post_init__(self) -> None:
         require(self.teeth >= 1, "teeth", self.teeth, "", "an integer >= 1")
@@ -98,5 +102,5 @@ def config_from_operation(op: Operation) -> ChatterConfig:
     pitch = op.tool.pitch
     return ChatterConfig(
         teeth=op.tool.teeth, nominal_speed=op.conditions.tool_speed,
-        equal_pitch=max(pitch) - min(pitch) < 1e-6,
+        equal_pitch=max(pitch) - min(pitch) < 1e-6, sensors=op.sensors,
     )

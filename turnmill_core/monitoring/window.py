@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turnmill_core.monitoring import stream as streams
-from turnmill_core.monitoring.blocks import Status
+from turnmill_core.monitoring.blocks import Channel, Status
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
+from turnmill_core.monitoring.sensors import implausible
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
@@ -195,7 +196,7 @@ def _choose_channel(config: ChatterConfig, s: Stream, start: int, end: int) -> t
     others = [k for k in range(len(names)) if k != chosen] if config.fallback or not config.channel else []
     for k in (chosen, *others):
         x = streams.samples(s, start, end, k)
-        reason, text = _condition(x, streams.status(s, start, end, k), names[k])
+        reason, text = _condition(x, streams.status(s, start, end, k), s.channels[k])
         if reason is Reason.NONE:
             return k, x.astype(np.float64), reason, text
         first = first or (k, x.astype(np.float64), reason, text)
@@ -203,12 +204,16 @@ def _choose_channel(config: ChatterConfig, s: Stream, start: int, end: int) -> t
     return first
 
 
-def _condition(x: NDArray[np.float32], status: Status, name: str) -> tuple[Reason, str]:
+def _condition(x: NDArray[np.float32], status: Status, channel: Channel) -> tuple[Reason, str]:
+    name = channel.name
     if not np.isfinite(x).all():
         return Reason.BAD_SAMPLES, f"channel {name} holds values that are no numbers"
     low, high = float(x.min()), float(x.max())
     if status & Status.DEAD or low == high:
         return Reason.BAD_SAMPLES, f"channel {name} is dead"
+    wrong = implausible(channel, low, high)
+    if wrong:
+        return Reason.BAD_SAMPLES, f"channel {name}: {wrong}"
     if status & Status.SATURATED or _clipped(x, low, high):
         return Reason.SATURATED, f"channel {name} is saturated"
     return Reason.NONE, ""
