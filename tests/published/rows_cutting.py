@@ -33,8 +33,9 @@ ANGLES, ELEMENTS = 1440, 200
 
 
 def rows() -> list[Row]:
-    """Every number of thesis chapter 3 and section 5 that this room computes."""
-    return [row._replace(computed=float(row.computed)) for row in (*table_31(), *table_32(), *section_42(), *chapter_5())]
+    """Every number of thesis chapter 3, sections 4.2 and 5 that this room computes."""
+    found = (*table_31(), *table_32(), *section_42(), *chapter_5())
+    return [row._replace(computed=float(row.computed)) for row in found]
 
 
 def load(name: str, helix_deg: float | None = None) -> Operation:
@@ -107,7 +108,9 @@ def table_32() -> list[Row]:
     turned = load("thesis_table_3_2", 13.7)
     share_turned = cutting_time_share(turned, turned.conditions)
     static, exact = _turn(straight), _turn(straight, "exact")
-    cut = dataclasses.replace(prepare_cut(straight, straight.conditions, 1), walls=(-math.inf, math.inf))
+    cut = prepare_cut(straight, straight.conditions, 1)
+    assert cut.bar is not None
+    cut = dataclasses.replace(cut, bar=dataclasses.replace(cut.bar, walls=(-math.inf, math.inf)))
     arc = np.linspace(cut.engagement.start[0, 0], cut.engagement.exit[0, 0], 200)
     trochoid = exact_chip(cut, arc[:, None, None] * np.ones((1, straight.tool.teeth, 1))).max()
     chip = "0.27 is not reached by the sine, the trochoid or the chip with the previous revolution's wall"
@@ -135,7 +138,8 @@ def section_42() -> list[Row]:
            "2004), rake 13.5 deg, helix 25 deg, chip 0.05 mm and 200 m/min assumed")
     values = ((732, found.Ktc, "MPa"), (56, found.Krc, "MPa"), (220, found.Kac, "MPa"), (21.96, found.Kte, "N/mm"),
               (23.21, found.Kre, "N/mm"), (22, found.Kae, "N/mm"))
-    return [Row(f"Al7050-T7451 {name}", "section 4.2.3", published, value * (1e-6 if unit == "MPa" else 1e-3), unit, why)
+    scale = {"MPa": 1e-6, "N/mm": 1e-3}
+    return [Row(f"Al7050-T7451 {name}", "section 4.2.3", published, value * scale[unit], unit, why)
             for name, (published, value, unit) in zip(("K_tc", "K_rc", "K_ac", "K_te", "K_re", "K_ae"), values,
                                                       strict=True)]
 
