@@ -18,8 +18,9 @@ import numpy as np
 from tests.published.row import Row
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import read_operation, shipped_operations
-from turnmill_core.operation_structure import Beam, Chuck, Mode, ShearCoefficient
+from turnmill_core.operation_structure import CROSS_READINGS, Beam, Chuck, Mode, ShearCoefficient
 from turnmill_core.stability.lobes import stability_boundary
+from turnmill_core.structure.at import with_cross_reading
 from turnmill_core.structure.beam import free_bar, normal_modes, on_chuck
 from turnmill_core.structure.profile import stock_profile
 from turnmill_core.structure.receptance import chuck_receptance, end_receptances, on_base
@@ -29,8 +30,8 @@ PIVOT, ROTATION = 0.26, 6.5e5
 
 
 def rows() -> list[Row]:
-    """Every published number of section 4.3.7.1 and 4.3.7.2 that this room computes."""
-    found = (*chuck_tables(), *aluminium(), *steel(), *ram())
+    """Every published number of section 4.3.7 that this room computes."""
+    found = (*chuck_tables(), *aluminium(), *steel(), *ram(), *cross_modes())
     return [row._replace(computed=float(row.computed)) for row in found]
 
 
@@ -156,4 +157,18 @@ def ram() -> list[Row]:
         found.append(Row(f"lowest depth limit of the slot, {name} ram", "section 4.3.7.1, Figure 4.43", published,
                          limit, "mm", "2000 to 12000 rpm; mode in Z: damping and mass of Table 4.9; it limits the "
                          "shortest ram. Both 15 % high, their ratio as printed (coefficients and Z mode are read)"))
+    return found
+
+
+def cross_modes() -> list[Row]:
+    """Tables 4.9 and 4.10: the limit of the printed cut with the cross modes in every reading."""
+    found = []
+    for name, where, test, rpm in (("thesis_table_4_9", "Table 4.9, 3350 and 6 rpm", "chatter at 1.2 mm", 3350),
+                                   ("thesis_table_4_10", "Table 4.10, 3500 and 12 rpm", "chatter at 0.6 mm", 3500)):
+        op = load(name)
+        for reading in CROSS_READINGS:
+            bar = dataclasses.replace(op.workpiece, structure=with_cross_reading(op.workpiece.structure, reading))
+            limit = stability_boundary(dataclasses.replace(op, workpiece=bar), [rpm * RPM], 12e-3).depth_limit[0] * 1e3
+            found.append(Row(f"depth limit, cross modes: {reading}", where, test, limit, "mm",
+                             "no reading gives the published level; the print has no mode shapes"))
     return found
