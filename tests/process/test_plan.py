@@ -153,13 +153,13 @@ def test_without_uncertainty_the_robust_choice_is_the_best_one() -> None:
 
 
 def test_the_robust_choice_stays_feasible_in_fresh_draws() -> None:
-    draws = draw(case(), 20, seed=1)
-    assert draw(case(), 20, seed=1).operations == draws.operations
+    draws = draw(case(), 10, seed=1)
+    assert draw(case(), 10, seed=1).operations == draws.operations
     robust, best = robust_choice(made(), draws, 0.9), made().best
     assert robust is not None
     assert best is not None
     assert robust.rate < best.rate
-    fresh = draw(case(), 30, seed=99)
+    fresh = draw(case(), 20, seed=99)
     assert feasible_share(robust, fresh) > feasible_share(best, fresh)
     assert feasible_share(robust, fresh) >= 0.75
     assert math.isnan(feasible_share(best, Draws((), 0)))

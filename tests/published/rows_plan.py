@@ -46,7 +46,7 @@ def flat(op: Operation) -> Operation:
 def planned(name: str) -> Plan:
     """The plan at the five workpiece speeds and 60 rpm: "flat" or "round"."""
     op, scale = (flat(case()), FLAT) if name == "flat" else (case(), 1.0)
-    grid = default_grid(case(), 100, 60)
+    grid = default_grid(case(), *((80, 48) if name == "flat" else (24, 48)))
     return plan(op, dataclasses.replace(grid, workpiece_speeds=tuple(w * RPM / scale for w in (*TABLE_5_2, 60))))
 
 

@@ -11,7 +11,9 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 from turnmill_msgs.srv import Replan
 
+from turnmill_core.operation import require
 from turnmill_core.prediction import PredictedType
+from turnmill_core.process.suggestion import with_modes
 from turnmill_ros import replan, topics
 from turnmill_ros.conversions import (
     margin_from_message,
@@ -93,8 +95,12 @@ class Planner(LifecycleNode):
         if operation is None:
             response.accepted, response.message = False, "no operation is loaded"
             return response
-        if not (math.isfinite(request.share) and 0 <= request.share <= 1):
-            response.accepted, response.message = False, f"share is {request.share!r}, expected a ratio in [0, 1]"
+        try:
+            require(math.isfinite(request.share) and 0 <= request.share <= 1, "share", request.share, "",
+                    "a ratio in [0, 1]")
+            with_modes(operation, request.mode_frequencies, request.mode_dampings)
+        except ValueError as error:
+            response.accepted, response.message = False, str(error)
             return response
         seen = () if request.forget_measured else self._observed.observations()
         asked = replan.Request(
