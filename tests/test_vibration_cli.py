@@ -57,8 +57,11 @@ def test_chatter_is_told(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_surface_figures(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    sheet, mesh, page = tmp_path / "s.csv", tmp_path / "s.ply", tmp_path / "s.html"
-    found = told(capsys, "surface", OP, *QUICK, "--csv", str(sheet), "--ply", str(mesh), "--report", str(page))
+    sheet, mesh, page, image = (tmp_path / f"s.{end}" for end in ("csv", "ply", "html", "png"))
+    found = told(capsys, "surface", OP, *QUICK, "--csv", str(sheet), "--ply", str(mesh), "--report", str(page),
+                 "--png", str(image))
+    assert found["warnings"] == []
+    assert image.read_bytes().startswith(b"\x89PNG")
     assert found["circularity_m"] == pytest.approx(circularity_error(22.2e-3, 6 * RPM, 4000 * RPM, 2), rel=1e-9)
     assert found["cusp_m"] == pytest.approx(static_cusp(found["feed_per_tooth_m"], math.radians(2.73)), rel=1e-9)  # type: ignore[arg-type]
     assert found["overcut_m"] > found["undercut_m"] >= 0  # type: ignore[operator]

@@ -41,7 +41,8 @@ def surface_report(output: Path, found: Surface, title: str, studied: Study | No
                   for k, p in enumerate(study_figures(studied))]
     table = report.html_table([tuple(map(escape, row)) for row in table_rows(found)], ("quantity", "value"))
     report.write_page(output, f"turnmill surface: {found.op.name}", [
-        f"<h1>{escape(found.op.name)}</h1>", f"<p class=note>{escape(title)}</p>", table,
+        f"<h1>{escape(found.op.name)}</h1>", f"<p class=note>{escape(title)}</p>",
+        "".join(f"<p><b>{escape(text)}</b></p>" for text in found.warnings), table,
     ], plots, [report.operation_tables(found.op)])
 
 

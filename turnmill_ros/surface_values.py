@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.machine.conditions import with_cut
+from turnmill_core.machine.conditions import machine_from_tool, with_cut
 from turnmill_core.operation import Conditions, Operation
 from turnmill_core.process.roughness import Roughness, profile_roughness, surface_roughness
 from turnmill_core.process.surface import FormError, form_error, steady_axial
 from turnmill_core.process.surface_map import SurfaceMap, ToothPrint, surface_map, tooth_print
 from turnmill_core.process.surface_profile import surface_feed_per_tooth, surface_shift, wiper_overlap
+from turnmill_core.stability.margin import stability_point
+from turnmill_core.structure.at import plain_structures
 
 Floats = NDArray[np.float64]
 FACETS_SHOWN = 6
@@ -28,7 +30,7 @@ class Surface:
     error: Eq. 5.6; map: the whole; detail: a few tooth passes; printed: one tooth in the thesis' reading; axial: tool
     angle [rad] and steady vibration along the tool axis [m]. along, around: roughness of a profile along the bar and
     around it, areal: of the map. feed, shift, overlap [m]: feed per tooth at the surface, what the surface moves
-    between two teeth, and the length of the wiper that passes twice.
+    between two teeth, and the length of the wiper that passes twice. warnings: what a reader must know first.
     """
 
     op: Operation
@@ -44,6 +46,7 @@ class Surface:
     feed: float
     shift: float
     overlap: float
+    warnings: tuple[str, ...]
 
 
 def surface(
@@ -65,8 +68,20 @@ def surface(
         _profile(whole.height[:, 0], step, cutoff, passes == round(passes)),
         _profile(whole.height[middle], arc, cutoff, around is None),
         surface_roughness(whole.height), surface_feed_per_tooth(op, cut), shift,
-        wiper_overlap(op.tool.shape.wiper_length, shift),
+        wiper_overlap(op.tool.shape.wiper_length, shift), _warnings(op, cut),
     )
+
+
+def _warnings(op: Operation, cut: Conditions) -> tuple[str, ...]:
+    """The surface is that of a steady cut: says where the cut chatters."""
+    rotation = machine_from_tool(op, cut)
+    if not any(structure.flexible for structure in plain_structures(op, rotation, cut)):
+        return ()
+    point = stability_point(op, cut)
+    if point.spectral_radius < 1:
+        return ()
+    return (f"this cut chatters (|multiplier| {point.spectral_radius:.3f}); the surface shown is that of its steady "
+            "vibration, which a machine would not show",)
 
 
 def _profile(profile: Floats, spacing: float, cutoff: float, closed: bool) -> Roughness:
@@ -119,7 +134,7 @@ def document(found: Surface) -> dict[str, object]:
         "feed_per_tooth_m": found.feed, "circularity_m": error.circularity, "cusp_m": error.cusp,
         "undercut_m": error.undercut, "overcut_m": error.overcut, "form_error_m": error.total,
         "print_undercut_m": max(0.0, float(printed.max())), "print_overcut_m": max(0.0, -float(printed.min())),
-        "surface_shift_m": found.shift, "wiper_overlap_m": found.overlap,
+        "surface_shift_m": found.shift, "wiper_overlap_m": found.overlap, "warnings": found.warnings,
         "map": {
             "columns": whole.angle.size, "rows": whole.axial.size, "radius_m": whole.radius,
             "mean_radius_m": whole.mean_radius, "undercut_m": whole.undercut, "overcut_m": whole.overcut,

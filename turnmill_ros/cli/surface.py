@@ -12,6 +12,7 @@ from turnmill_ros.cli.output import (
     JsonFlag,
     OperationArgument,
     SetOption,
+    console,
     new_file,
     print_json,
     progress,
@@ -41,6 +42,7 @@ def surface(
     study: Annotated[bool, typer.Option(
         "--study", help="With --report: the form error over speed ratios and depths too.")] = False,
     report: Annotated[Path | None, typer.Option("--report", metavar="HTML", help="Write pictures as HTML.")] = None,
+    png: Annotated[Path | None, typer.Option("--png", metavar="PNG", help="Write a picture in 3D as PNG.")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", metavar="CSV", help="Write the map as CSV.")] = None,
     ply: Annotated[Path | None, typer.Option(
         "--ply", metavar="PLY", help="Write the map on its cylinder as PLY.")] = None,
@@ -53,7 +55,7 @@ def surface(
     from turnmill_ros import report as pages
     from turnmill_ros import surface_values as values
 
-    html, sheet, mesh = (None if path is None else new_file(path) for path in (report, csv, ply))
+    html, image, sheet, mesh = (None if path is None else new_file(path) for path in (report, png, csv, ply))
     if study and html is None:
         raise InputError("surface: --study is a part of the pictures; give --report FILE too")
     op, cut = asked(op_name, changes, tool_speed, workpiece_speed, depth)
@@ -70,6 +72,10 @@ def surface(
         with progress("form error over speeds and depth", as_json or not study) as advance:
             studied = values.study(op, cut, progress=advance) if study else None
         surface_report(html, found, title(op, cut), studied)
+    if image is not None:
+        from turnmill_ros.surface_png import surface_png
+
+        pages.write_bytes(image, surface_png(found))
     if sheet is not None:
         pages.write_text(sheet, values.csv_text(found.map))
     if mesh is not None:
@@ -78,3 +84,5 @@ def surface(
         print_json(values.document(found))
         return
     table(title(op, cut), ("quantity", "value"), values.table_rows(found))
+    for text in found.warnings:
+        console.print(f"note: {text}", soft_wrap=True)
