@@ -10,7 +10,7 @@ import pytest
 from tests.cutting.cases import AL6061, MM, milling
 from turnmill_core.cutting.forces import revolution
 from turnmill_core.cutting.identification import AverageForces, identify
-from turnmill_core.operation import Tool
+from turnmill_core.operation import Shape, Tool
 
 TOOL = Tool("t", 20 * MM, 4, math.radians(30))
 TRUTH = np.array([AL6061.Ktc, AL6061.Krc, AL6061.Kac, AL6061.Kte, AL6061.Kre, AL6061.Kae])
@@ -88,3 +88,9 @@ def test_one_feed_or_two_tests_are_not_enough() -> None:
         identify(TOOL, two)
     with pytest.raises(ValueError, match="confidence is 1"):
         identify(TOOL, same, 1.0)
+
+
+def test_only_cylinders_have_this_closed_form() -> None:
+    ball = Tool("ball", 20 * MM, 4, shape=Shape(corner_radius=10 * MM))
+    with pytest.raises(ValueError, match="a cylinder"):
+        identify(ball, measured([(0, 10)]))

@@ -18,13 +18,14 @@ from turnmill_msgs.srv import GetStability, LoadOperation
 
 from tests.bag_cases import block, write
 from tests.nodes.ros_tools import Probe
+from turnmill_core.cutting.along_path import loads_along
 from turnmill_core.cutting.loads import cutting_loads
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.operation import Operation
-from turnmill_core.operation_file import read_operation, shipped_operations
+from turnmill_core.operation_file import parse_operation, read_operation, shipped_operations
 from turnmill_core.stability.margin import stability_margin
 from turnmill_ros import topics
 from turnmill_ros.bag import bag_info
@@ -39,6 +40,7 @@ from turnmill_ros.conversions import (
     time_from_message,
     wrench_to_message,
 )
+from turnmill_ros.errors import InputError
 from turnmill_ros.interfaces import ros_types
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.nodes.chatter_monitor import ChatterMonitor
@@ -48,6 +50,7 @@ from turnmill_ros.nodes.operation_server import OperationServer
 from turnmill_ros.nodes.player import Player
 from turnmill_ros.nodes.process_simulator import ProcessSimulator
 from turnmill_ros.nodes.stability_monitor import StabilityMonitor
+from turnmill_ros.operations import changed_text
 
 pytestmark = pytest.mark.ros
 
@@ -165,6 +168,31 @@ def test_the_force_predictor_publishes_what_the_core_computes(probe: Probe) -> N
     probe.publish(topics.JOINT_STATES, axes_to_message(far, ros_types()))
     assert probe.until(lambda: any("no prediction" in s.message and "axis b" in s.message
                                    for s in probe.statuses("force_predictor")))
+
+
+def test_the_force_predictor_follows_the_workpiece_in_process(probe: Probe) -> None:
+    """A tilted tool has no closed form; the node gives what the path gives."""
+    op = parse_operation(changed_text(operation().text, ["cut.tilt=2 deg", "tool.flute_length=40 mm"]))
+    publish_operation(probe, op)
+    probe.listen(topics.CUTTING_LOADS)
+    probe.announce(topics.JOINT_STATES)
+    predictor = probe.add(ForcePredictor, match=["joint_states=1", "cutting_loads=1"])
+    assert support.start(predictor)
+    states = []
+    for k in range(12):
+        axes = axis_state_at(op, k * 0.02, 10**12 + k * 20_000_000)
+        x, y, z, b, c, s = axes.position
+        states.append(replace(axes, position=(x, y, z, b + op.tilt, c, s)))
+        probe.publish(topics.JOINT_STATES, axes_to_message(states[-1], ros_types()))
+    heard = probe.heard["cutting_loads"]
+    assert probe.until(lambda: len(heard) == 12)
+    expected = loads_along(op, states)
+    assert expected.method == "swept"
+    assert expected.in_cut.all()
+    found = np.array([loads_from_message(m)["force_machine_mean"] for m in heard])
+    np.testing.assert_allclose(found, expected.force_machine, rtol=1e-9)
+    with pytest.raises(InputError, match=r"engagement.*guess.*auto or closed or swept"):
+        probe.add(ForcePredictor, engagement="guess")
 
 
 def test_the_force_predictor_estimates_the_scale_of_the_force_coefficients(probe: Probe) -> None:

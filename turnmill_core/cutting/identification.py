@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from turnmill_core.cutting.tool import Array, read_only
+from turnmill_core.cutting.tool import Array, read_only, require_cylinder
 from turnmill_core.operation import Tool, require
 
 NAMES = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
@@ -73,8 +73,10 @@ def identify(tool: Tool, tests: AverageForces, confidence: float = 0.95) -> Iden
         confidence: probability of the two-sided intervals, each coefficient by itself.
 
     Raises:
-        ValueError: too few tests, feeds that are all alike, or a confidence outside (0, 1).
+        ValueError: another tool than a cylinder, too few tests, feeds that are all alike, or a confidence outside
+            (0, 1).
     """
+    require_cylinder(tool)
     require(0 < confidence < 1, "confidence", confidence, "", "a probability in (0, 1)")
     n = len(tests.feed_per_tooth)
     require(n >= 3, "number of tests", n, "", "at least 3, so that scatter can be told from slope")
