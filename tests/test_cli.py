@@ -159,3 +159,15 @@ def test_impossible_stability_questions(
     assert code == 2
     assert word in err
     assert err.count("\n") == 1
+
+
+def test_low_speed_shows_three_curves_and_warns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("lobes", "thesis_table_4_11", "--low-speed", "--tool-speeds", "1200rpm..2100rpm", "--points", "4x2",
+                 "--deepest", "4mm")
+    code, out, err = ask(capsys, *arguments, "--report", str(tmp_path / "a.html"), "--png", str(tmp_path / "a.png"))
+    assert (code, err) == (0, "")
+    assert "warning: radial immersion is 0.40" in out
+    assert "envelope through two trials" in (tmp_path / "a.html").read_text()
+    low = json.loads(ask(capsys, *arguments, "--json")[1])["low_speed"]
+    assert low["envelope_limit_m"] == pytest.approx(0.2312e-3, rel=1e-3)
+    assert len(low["envelope_m"]) == len(low["limit_with_process_damping_m"]) == 4

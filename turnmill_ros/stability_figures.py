@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.lobes import Boundary, Lobes
+from turnmill_core.stability.low_speed import LowSpeed
 from turnmill_core.stability.trials import JudgedTrial
 from turnmill_ros.figures import LINE_COLOURS, legend_right, new_figure
-from turnmill_ros.stability_values import RPM, Diagrams, limit_surface
+from turnmill_ros.stability_values import RPM, Diagrams, limit_surface, low_speed_curves
 
 Floats = NDArray[np.float64]
 TYPE_COLOURS = {PredictedType.STABLE: "#9ed9c5", PredictedType.HOPF: "#e9a98a", PredictedType.FLIP: "#dba6c6"}
@@ -45,6 +46,7 @@ def _map(plot: figure, part: Lobes, rpm: Floats, width: float) -> None:
     depth = part.depths * 1e3
     height = 0.5 * (depth[-1] - depth[0]) / max(depth.size - 1, 1) or 0.5 * depth[0]
     kinds = list(TYPE_COLOURS)
+    plot.background_fill_color, plot.grid.visible = TYPE_COLOURS[PredictedType.STABLE], False  # below the first depth
     number = np.searchsorted([k.value for k in kinds], part.predicted_type)
     source = ColumnDataSource({
         "image": [number.astype(np.uint8)], "radius": [part.spectral_radius.astype(np.float32)],
@@ -93,6 +95,9 @@ def trial_groups(trials: Sequence[JudgedTrial]) -> dict[tuple[str, bool], list[J
 
 
 def _marks(plot: figure, found: Diagrams, workpiece_speed: float) -> None:
+    if abs(found.cut.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed):
+        plot.scatter([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], size=15, marker="star", color="#ffffff",
+                     line_color="#000000", line_width=1.5, legend_label="operating point")
     for (outcome, agrees), group in sorted(trial_groups(found.trials_at(workpiece_speed)).items()):
         source = ColumnDataSource({
             "x": [t.trial.tool_speed * RPM for t in group], "y": [t.trial.depth * 1e3 for t in group],
@@ -104,9 +109,6 @@ def _marks(plot: figure, found: Diagrams, workpiece_speed: float) -> None:
         plot.add_tools(HoverTool(renderers=[marks], tooltips=[
             ("trial", f"{outcome}, @note"), ("at", "@x{0} rpm, @y{0.00} mm"),
             ("computed |multiplier|", "@radius{0.000}")]))
-    if abs(found.cut.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed):
-        plot.scatter([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], size=15, marker="star", color="#ffffff",
-                     line_color="#000000", line_width=1.5, legend_label="operating point")
 
 
 def limit_map(found: Diagrams) -> figure:
@@ -122,8 +124,8 @@ def limit_map(found: Diagrams) -> figure:
     j, i = (v.ravel() for v in np.meshgrid(np.arange(rpm.size), np.arange(rows.size)))
     source = ColumnDataSource({"left": rpm[j] - width, "right": rpm[j] + width, "bottom": edge[i], "top": edge[i + 1],
                                "limit": limit[i, j], "tool": rpm[j], "workpiece": rows[i]})
-    plot.quad("left", "right", "bottom", "top", source=source, line_color=None,
-              fill_color={"field": "limit", "transform": mapper})
+    plot.quad("left", "right", "bottom", "top", source=source, fill_color={"field": "limit", "transform": mapper},
+              line_color={"field": "limit", "transform": mapper})
     plot.add_tools(HoverTool(tooltips=[
         ("tool speed", "@tool{0} rpm"), ("workpiece speed", "@workpiece{0.0} rpm"), ("limit", "@limit{0.000} mm")]))
     plot.add_layout(ColorBar(color_mapper=mapper, title="mm", width=12), "right")
@@ -131,6 +133,19 @@ def limit_map(found: Diagrams) -> figure:
         plot.scatter([found.cut.tool_speed * RPM], [found.cut.workpiece_speed * RPM], size=15, marker="star",
                      color="#ffffff", line_color="#000000", line_width=1.5, legend_label="operating point")
         legend_right(plot)
+    return plot
+
+
+def low_speed(found: Diagrams, low: LowSpeed) -> figure:
+    """Limits without and with process damping, and the envelope through two trials, with all trials (Figure 4.64)."""
+    rpm = low.tool_speeds * RPM
+    plot = new_figure("Lowest limit at low speed", "tool speed [rpm]", "axial depth of cut [mm]", 420,
+                      y_range=Range1d(0, found.deepest * 1e3))
+    for k, (name, limit) in enumerate(low_speed_curves(found, low).items()):
+        plot.line(rpm, limit, color=("#000000", LINE_COLOURS[3], LINE_COLOURS[1])[k], line_width=2.5,
+                  line_dash=DASHES[k], legend_label=name)
+    _marks(plot, found, found.parts[0].workpiece_speed)
+    legend_right(plot)
     return plot
 
 

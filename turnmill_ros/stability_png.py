@@ -12,17 +12,21 @@ from matplotlib.patches import Patch
 
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.lobes import Boundary, Lobes
+from turnmill_core.stability.low_speed import LowSpeed
 from turnmill_ros.stability_figures import EDGE_COLOURS, TYPE_COLOURS, TYPE_NAMES, trial_groups
-from turnmill_ros.stability_values import RPM, Diagrams, limit_surface
+from turnmill_ros.stability_values import RPM, Diagrams, limit_surface, low_speed_curves
 
 MARKERS = {"stable": "o", "marginal": "^", "chatter": "x"}
 ENDS = {PredictedType.HOPF: "o", PredictedType.FLIP: "s"}
 
 
 def diagrams_png(found: Diagrams) -> bytes:
-    """The picture: one diagram, or with several workpiece speeds the surface of limits and its view from above."""
+    """The picture: one diagram, the limits at low speed where they were asked for, or with several workpiece speeds the
+    surface of limits and its view from above."""
     picture = Figure(figsize=(10, 6) if len(found.parts) == 1 else (15, 6.5), dpi=120, layout="constrained")
-    if len(found.parts) == 1:
+    if found.low_speed is not None:
+        _low_speed(picture.add_subplot(), found, found.low_speed)
+    elif len(found.parts) == 1:
         _diagram(picture.add_subplot(), found, found.parts[0])
     else:
         _surface(picture.add_subplot(1, 2, 1, projection="3d"), found)
@@ -43,6 +47,7 @@ def _diagram(axes: Any, found: Diagrams, part: Lobes | Boundary) -> None:
     if isinstance(part, Lobes):
         kinds = list(TYPE_COLOURS)
         number = np.searchsorted([k.value for k in kinds], part.predicted_type)
+        axes.set_facecolor(TYPE_COLOURS[PredictedType.STABLE])
         axes.pcolormesh(rpm, part.depths * 1e3, number, shading="nearest", cmap=ListedColormap(list(
             TYPE_COLOURS.values())), norm=BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds)), rasterized=True)
         handles += [Patch(facecolor=TYPE_COLOURS[kinds[k]], edgecolor="#444444", label=TYPE_NAMES[kinds[k]])
@@ -50,18 +55,35 @@ def _diagram(axes: Any, found: Diagrams, part: Lobes | Boundary) -> None:
         handles += axes.plot(rpm, part.depth_limit * 1e3, color="black", label="lowest limit")
     else:
         handles += _boundary(axes, part, rpm)
-    for (outcome, agrees), group in sorted(trial_groups(found.trials_at(part.workpiece_speed)).items()):
-        handles += axes.plot(
-            [t.trial.tool_speed * RPM for t in group], [t.trial.depth * 1e3 for t in group], MARKERS[outcome],
-            markersize=11, markeredgewidth=2.5, markeredgecolor="black" if agrees else "#0072b2",
-            markerfacecolor="white", label=f"trial: {outcome}, {'computed too' if agrees else 'not so computed'}")
-    if abs(found.cut.workpiece_speed - part.workpiece_speed) <= 0.01 * abs(part.workpiece_speed):
-        handles += axes.plot([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], "*", markersize=15,
-                             markerfacecolor="white", markeredgecolor="black", label="operating point")
+    handles += _marks(axes, found, part.workpiece_speed)
     axes.set(xlabel="tool speed [rpm]", ylabel="axial depth of cut [mm]", ylim=(0, found.deepest * 1e3),
              title=found.op.name + (f"\nworkpiece {part.workpiece_speed * RPM:.4g} rpm"
                                     if found.op.process == "turn-milling" else ""))
     axes.margins(x=0)
+    axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+
+
+def _marks(axes: Any, found: Diagrams, workpiece_speed: float) -> list[Any]:
+    handles = []
+    if abs(found.cut.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed):
+        handles += axes.plot([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], "*", markersize=15,
+                             markerfacecolor="white", markeredgecolor="black", label="operating point")
+    for (outcome, agrees), group in sorted(trial_groups(found.trials_at(workpiece_speed)).items()):
+        handles += axes.plot(
+            [t.trial.tool_speed * RPM for t in group], [t.trial.depth * 1e3 for t in group], MARKERS[outcome],
+            markersize=11, markeredgewidth=2.5, markeredgecolor="black" if agrees else "#0072b2",
+            markerfacecolor="white", label=f"trial: {outcome}, {'computed too' if agrees else 'not so computed'}")
+    return handles
+
+
+def _low_speed(axes: Any, found: Diagrams, low: LowSpeed) -> None:
+    handles = []
+    for k, (name, limit) in enumerate(low_speed_curves(found, low).items()):
+        handles += axes.plot(low.tool_speeds * RPM, limit, ("-", "--", "-.")[k],
+                             color=("black", "#cc79a7", "#d55e00")[k], linewidth=2, label=name)
+    handles += _marks(axes, found, found.parts[0].workpiece_speed)
+    axes.set(xlabel="tool speed [rpm]", ylabel="axial depth of cut [mm]", ylim=(0, found.deepest * 1e3),
+             title=f"{found.op.name}\nlowest limit at low speed")
     axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from turnmill_core.operation import Conditions, Operation
+from turnmill_core.stability.low_speed import LowSpeed
 from turnmill_ros import report, stability_figures
 from turnmill_ros.stability_values import RPM, Diagrams
 
@@ -31,10 +32,13 @@ def lobes_report(output: Path, found: Diagrams) -> None:
         image = base64.b64encode(diagrams_png(found)).decode()
         tail.append(f'<h2>In three dimensions</h2><img style="max-width:100%" src="data:image/png;base64,{image}" '
                     'alt="surface of depth limits over tool speed and workpiece speed">')
-    if len(found.parts) > 1:
+    if len(found.parts) > 2:
         plots.append(("Limit over both spindles", stability_figures.limit_map(found)))
     plots += [("Tool speed and depth" if k == 0 else "", stability_figures.diagram(found, part))
               for k, part in enumerate(shown)]
+    if found.low_speed is not None:
+        plots.append(("Low speed", stability_figures.low_speed(found, found.low_speed)))
+        tail.append(_low_speed(found.low_speed))
     if found.trials:
         tail.append("<h2>Trials</h2>" + report.html_table([
             (escape(t.trial.note or "-"), f"{t.trial.tool_speed * RPM:.0f}", f"{t.trial.workpiece_speed * RPM:g}",
@@ -81,6 +85,15 @@ def delay_report(
             f"<p class=note>tool {cut.tool_speed * RPM:g} rpm, workpiece {cut.workpiece_speed * RPM:g} rpm, depth "
             f"{cut.depth * 1e3:g} mm</p>", report.html_table([tuple(map(escape, row)) for row in rows], header)]
     report.write_page(output, f"turnmill delay: {op.name}", head, plots, [report.operation_tables(op)])
+
+
+def _low_speed(low: LowSpeed) -> str:
+    if low.envelope is None:
+        return "<p class=note>Two chatter trials would give the envelope at low speed; the operation has not two.</p>"
+    text = (f"Envelope through the first two chatter trials: limit {low.envelope.depth_limit * 1e3:.4f} mm, asymptotic "
+            f"speed {low.envelope.asymptotic_speed * RPM:.1f} rpm, ploughing coefficient {low.ploughing:.3g} N/m.")
+    warning = f"<p><b>Warning: {escape(low.warning)}.</b></p>" if low.warning else ""
+    return f"<h2>Low speed</h2><p>{escape(text)}</p>{warning}"
 
 
 def _hertz(frequency: float | None) -> str:

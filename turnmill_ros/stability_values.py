@@ -13,6 +13,7 @@ import numpy as np
 from turnmill_core.operation import Conditions, Operation
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.lobes import Boundary, Lobes
+from turnmill_core.stability.low_speed import LowSpeed, envelope_depth
 from turnmill_core.stability.margin import StabilityPoint
 from turnmill_core.stability.trials import JudgedTrial
 
@@ -24,7 +25,8 @@ class Diagrams:
     """Stability diagrams of one operation, one for each workpiece speed, ascending.
 
     parts: maps or boundaries, all over the same tool speeds and depths; cut, point: the operating point and its
-    stability; trials: the operation's; delay_model: by name.
+    stability; trials: the operation's; delay_model: by name; low_speed: limits with and without process damping, where
+    they were asked for.
     """
 
     op: Operation
@@ -33,6 +35,7 @@ class Diagrams:
     parts: tuple[Lobes | Boundary, ...]
     trials: tuple[JudgedTrial, ...]
     delay_model: str
+    low_speed: LowSpeed | None = None
 
     @property
     def deepest(self) -> float:
@@ -65,7 +68,27 @@ def diagrams_document(found: Diagrams) -> dict[str, Any]:
             "note": t.trial.note, "predicted_type": t.point.predicted_type.name,
             "spectral_radius": t.point.spectral_radius, "predicted_frequency_hz": t.point.chatter_frequency,
             "agrees": t.agrees} for t in found.trials],
+        "low_speed": None if found.low_speed is None else _low_speed(found.low_speed),
     }
+
+
+def _low_speed(low: LowSpeed) -> dict[str, Any]:
+    envelope = low.envelope
+    return {
+        "tool_speeds_rad_s": low.tool_speeds, "limit_without_process_damping_m": low.undamped,
+        "limit_with_process_damping_m": low.damped, "radial_immersion_ratio": low.immersion, "warning": low.warning,
+        "envelope_limit_m": None if envelope is None else envelope.depth_limit,
+        "envelope_asymptotic_speed_rad_s": None if envelope is None else envelope.asymptotic_speed,
+        "envelope_m": None if envelope is None else envelope_depth(envelope, low.tool_speeds),
+        "ploughing_coefficient_n_m": low.ploughing}
+
+
+def low_speed_curves(found: Diagrams, low: LowSpeed) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Limits [mm] over tool speed by name; NaN above the searched depth."""
+    named = {"without process damping": low.undamped, "with process damping": low.damped}
+    if low.envelope is not None:
+        named["envelope through two trials"] = envelope_depth(low.envelope, low.tool_speeds)
+    return {k: np.where(v < found.deepest * (1 - 1e-9), v * 1e3, np.nan) for k, v in named.items()}
 
 
 def _part(part: Lobes | Boundary) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from turnmill_ros.cli.output import (
     JsonFlag,
     OperationArgument,
     SetOption,
+    console,
     new_file,
     print_json,
     progress,
@@ -54,6 +55,8 @@ def lobes(
         metavar="NxMxK", help="Tool speeds, depths, and workpiece speeds of a range.")] = "200x100x20",
     kind: Annotated[Kind, typer.Option(
         help="map: every point; boundary: the limits, refined.")] = "map",
+    low_speed: Annotated[bool, typer.Option(
+        "--low-speed", help="Also the limits without process damping and the envelope through two trials.")] = False,
     delay: DelayOption = "mean",
     report: Annotated[Path | None, typer.Option("--report", metavar="HTML", help="Write pictures as HTML.")] = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="PNG", help="Write the picture as PNG.")] = None,
@@ -76,7 +79,7 @@ def lobes(
     speeds = _range(tool_speeds, "--tool-speeds", n) if tool_speeds is not None else (
         np.linspace(0.5, 1.5, n) * op.conditions.tool_speed)
     found = _computed(op, cut, speeds, _workpiece_speeds(workpiece_speeds, k, cut),
-                      quantity(deepest, "m", "--deepest"), m, kind, delay, as_json)
+                      quantity(deepest, "m", "--deepest"), m, kind, low_speed, delay, as_json)
     if html is not None:
         from turnmill_ros.stability_report import lobes_report
 
@@ -103,6 +106,13 @@ def _tables(found: Diagrams) -> None:
     table("Operating point", ("verdict", "largest |multiplier|", "chatter frequency"), [(
         found.point.predicted_type.name, f"{found.point.spectral_radius:.4f}",
         "-" if math.isnan(found.point.chatter_frequency) else f"{found.point.chatter_frequency:.1f} Hz")])
+    low = found.low_speed
+    if low is not None and low.envelope is not None:
+        console.print(f"envelope at low speed: limit {low.envelope.depth_limit * 1e3:.4f} mm, asymptotic speed "
+                      f"{low.envelope.asymptotic_speed * RPM:.1f} rpm, ploughing coefficient {low.ploughing:.3g} N/m",
+                      soft_wrap=True)
+        if low.warning:
+            console.print(f"warning: {low.warning}", style="yellow", soft_wrap=True)
     if found.trials:
         table("Trials", ("trial", "cut", "outcome", "computed", "largest |multiplier|", "agree"), [
             (t.trial.note or "-", f"{t.trial.tool_speed * RPM:.0f} rpm, {t.trial.workpiece_speed * RPM:g} rpm, "
@@ -112,9 +122,10 @@ def _tables(found: Diagrams) -> None:
 
 def _computed(
     op: Operation, cut: Conditions, speeds: Floats, workpiece: Floats, deepest: float | None, depths: int, kind: Kind,
-    delay: Delay, quiet: bool,
+    low_speed: bool, delay: Delay, quiet: bool,
 ) -> Diagrams:
     from turnmill_core.stability.lobes import Boundary, Lobes, stability_boundary, stability_lobes
+    from turnmill_core.stability.low_speed import low_speed_limits
     from turnmill_core.stability.margin import searched_depth, stability_point
     from turnmill_core.stability.trials import judged_trials
     from turnmill_ros.stability_values import Diagrams
@@ -130,7 +141,11 @@ def _computed(
             parts.append(
                 stability_lobes(op, speeds, np.linspace(0, largest, depths + 1)[1:], float(speed), told, delay)
                 if kind == "map" else stability_boundary(op, speeds, largest, float(speed), told, delay))
-    return Diagrams(op, cut, point, tuple(parts), judged_trials(op, delay), delay)
+    low = None
+    if low_speed:
+        with progress("computing the limits at low speed", quiet) as tell:
+            low = low_speed_limits(op, speeds, largest, float(workpiece[0]), lambda done, total: tell(done / total))
+    return Diagrams(op, cut, point, tuple(parts), judged_trials(op, delay), delay, low)
 
 
 def _points(text: str) -> tuple[int, int, int]:
