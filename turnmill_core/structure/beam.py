@@ -22,7 +22,7 @@ from turnmill_core.structure.modal import Complexes, Floats, frozen_array
 from turnmill_core.structure.profile import BarProfile
 
 ORDER = 12
-"""Order of the polynomials in an element; less where a bar has many."""
+"""Order of the polynomials in an element as long as the bar; less in shorter ones, at least 3."""
 
 
 def shear_coefficient(name: ShearCoefficient, poisson_ratio: float) -> float:
@@ -42,7 +42,7 @@ class PlaneModel:
 
     M, C, K (n, n): mass [kg, ...], damping, stiffness; lossy (n, n): the part eta K_loss that is hysteretic. reach
     (k, n): rows that give y and the rotation of each node; nodes (k/2,) [m]: distances of the nodes from the free end;
-    order: of the elements.
+    ends: the nodes at which elements meet.
     """
 
     M: Floats
@@ -51,7 +51,7 @@ class PlaneModel:
     lossy: Floats
     reach: Floats
     nodes: Floats
-    order: int = ORDER
+    ends: tuple[int, ...]
 
     def __post_init__(self) -> None:
         n = np.shape(self.M)[0]
@@ -62,12 +62,12 @@ class PlaneModel:
 
     def row(self, distance: float) -> Floats:
         """Row (n,) that gives the displacement at a distance [m] from the free end."""
-        s, p = self.nodes, self.order
+        s = self.nodes
         require(-1e-9 <= distance <= s[-1] + 1e-9, "place on the bar", distance, "m", f"0 to {s[-1]:.6g} m")
-        ends = s[::p]
-        e = min(max(int(np.searchsorted(ends, distance)) - 1, 0), ends.size - 2)
-        own = s[e * p : (e + 1) * p + 1]
-        return np.asarray(_lagrange(own, np.array([distance]))[:, 0] @ self.reach[2 * e * p : 2 * (e + 1) * p + 2 : 2])
+        e = min(max(int(np.searchsorted(s[list(self.ends)], distance)) - 1, 0), len(self.ends) - 2)
+        first, last = self.ends[e], self.ends[e + 1]
+        weights = _lagrange(s[first : last + 1], np.array([distance]))[:, 0]
+        return np.asarray(weights @ self.reach[2 * first : 2 * last + 2 : 2])
 
 
 def _lagrange(nodes: Floats, x: Floats) -> Floats:
@@ -94,28 +94,30 @@ def free_bar(
 ) -> PlaneModel:
     """A bar that floats freely; at least one element for each of its cylinders.
 
-    order: of the elements (None: ORDER, and less for a bar of many cylinders); ends_at [m]: distances from the free end
-    at which elements end, too.
+    order: of every element (None: by its length, see ORDER); ends_at [m]: distances from the free end at which elements
+    end, too.
     """
     own = profile.split(ends_at)
-    p = order or min(ORDER, max(4, math.ceil(3 * ORDER / own.radius.size)))
-    ref, mass, stiff, mixed = _reference(p)
     length = np.diff(own.edges)
-    nodes = np.append((own.edges[:-1, None] + np.outer(length, ref[:-1] + 1) / 2).ravel(), own.edges[-1])
+    orders = [order or max(3, min(ORDER, math.ceil(2 + ORDER * L / own.length))) for L in length]
+    ends = [0, *np.cumsum(orders).tolist()]
+    nodes = np.append(np.concatenate([start + L / 2 * (_reference(p)[0][:-1] + 1)
+                                      for start, L, p in zip(own.edges, length, orders, strict=False)]), own.edges[-1])
     area, inertia = np.pi * (own.radius**2 - own.bore**2), np.pi / 4 * (own.radius**4 - own.bore**4)
     E, rho = material.youngs_modulus, material.density
     shearing = shear_coefficient(shear, material.poisson_ratio) * E / (2 * (1 + material.poisson_ratio)) * area
     n = 2 * nodes.size
     K, M = np.zeros((n, n)), np.zeros((n, n))
     for i, (L, A, second, GA) in enumerate(zip(length, area, inertia, shearing, strict=True)):
-        y, turn = (slice(2 * i * p + k, 2 * (i + 1) * p + k + 1, 2) for k in (0, 1))
+        _, mass, stiff, mixed = _reference(orders[i])
+        y, turn = (slice(2 * ends[i] + k, 2 * ends[i + 1] + k + 1, 2) for k in (0, 1))
         M[y, y] += rho * A * L / 2 * mass
         M[turn, turn] += rho * second * L / 2 * mass
         K[y, y] += 2 * GA / L * stiff
         K[turn, turn] += 2 * E * second / L * stiff + GA * L / 2 * mass
         K[y, turn] -= GA * mixed
         K[turn, y] -= GA * mixed.T
-    return PlaneModel(M, np.zeros((n, n)), K, material.loss_factor * K, np.eye(n), nodes, p)
+    return PlaneModel(M, np.zeros((n, n)), K, material.loss_factor * K, np.eye(n), nodes, tuple(ends))
 
 
 def with_supports(model: PlaneModel, supports: tuple[Support, ...]) -> PlaneModel:
@@ -125,7 +127,7 @@ def with_supports(model: PlaneModel, supports: tuple[Support, ...]) -> PlaneMode
         row = model.row(support.position)
         K += support.stiffness * np.outer(row, row)
         C += support.damping * np.outer(row, row)
-    return PlaneModel(model.M, C, K, model.lossy, model.reach, model.nodes, model.order)
+    return PlaneModel(model.M, C, K, model.lossy, model.reach, model.nodes, model.ends)
 
 
 def on_chuck(model: PlaneModel, chuck: Chuck) -> PlaneModel:
@@ -156,7 +158,7 @@ def on_chuck(model: PlaneModel, chuck: Chuck) -> PlaneModel:
             relative[len(free):] -= face[i]
             K += stiffness * np.outer(relative, relative)
             C += damping * np.outer(relative, relative)
-    return PlaneModel(M, C, K, lossy, model.reach @ T, model.nodes, model.order)
+    return PlaneModel(M, C, K, lossy, model.reach @ T, model.nodes, model.ends)
 
 
 def receptances(model: PlaneModel, rows: ArrayLike, frequency: ArrayLike) -> Complexes:

@@ -46,9 +46,12 @@ class BarProfile:
         return float(density * np.pi * np.diff(self.edges) @ (self.radius**2 - self.bore**2))
 
     def split(self, at: ArrayLike) -> BarProfile:
-        """The same bar with further edges at distances [m] from the free end; those outside it are left out."""
+        """The same bar with further edges at distances `at` [m] from the free end.
+
+        Left out are those outside it and those within a ten-thousandth of its length of another edge.
+        """
         places = np.atleast_1d(np.asarray(at, dtype=np.float64))
-        tiny = 1e-9 * self.length
+        tiny = 1e-4 * self.length
         far = np.abs(places[:, None] - self.edges).min(axis=1) > tiny
         edges = np.unique(np.concatenate([self.edges, places[far & (places > 0) & (places < self.length)]]))
         middle = (edges[:-1] + edges[1:]) / 2
