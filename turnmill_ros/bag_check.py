@@ -23,7 +23,7 @@ Severity = Literal["error", "warning", "note"]
 
 UNITS = {
     "sound_pressure": "Pa", "displacement": "m", "acceleration": "m/s2", "force": "N", "torque": "N m", "power": "W",
-    "voltage": "V",
+    "voltage": "V", "velocity": "m/s",
 }
 """SI unit of every quantity that a sensor channel may have; "1" says that the scale is unknown."""
 

@@ -76,6 +76,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     tool, material = op.tool, op.material
     require_cylinder(tool)
     require(op.tilt == 0, "tilt", op.tilt, "rad", "0 in the simulation")
+    for name, frame in (("tool", tool.structure.frame), ("workpiece", op.workpiece.structure.frame)):
+        require(frame != "rotating", f"{name} frame", frame, "", "modes that do not turn with the spindle")
     flank = op.process_damping
     damping = (flank.coefficient(1.0) / tool.radius, flank.friction) if flank else (0.0, 0.0)
     dt = 1.0 / (config.sample_rate * config.ratio)
