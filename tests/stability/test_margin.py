@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from turnmill_core.machine.conditions import with_cut
-from turnmill_core.operation import Operation
+from turnmill_core.operation import Operation, Shape
 from turnmill_core.operation_file import read_operation, shipped_operations
+from turnmill_core.operation_structure import ModeTable
 from turnmill_core.prediction import PredictedType
 from turnmill_core.stability.collocation import leading_multiplier, period_map
 from turnmill_core.stability.delay import DelayModel
@@ -195,3 +196,48 @@ def test_the_boundary_is_where_the_diagram_turns(case_1: Operation) -> None:
 def test_an_unknown_delay_model_is_refused(case_1: Operation) -> None:
     with pytest.raises(ValueError, match="delay model"):
         stability_point(case_1, case_1.conditions, "thesis")  # type: ignore[arg-type]
+
+
+def test_cuts_that_the_model_does_not_know_are_refused(case_1: Operation) -> None:
+    ball = dataclasses.replace(case_1.tool, shape=Shape(corner_radius=case_1.tool.radius))
+    with pytest.raises(ValueError, match="cylindrical"):
+        stability_point(dataclasses.replace(case_1, tool=ball), case_1.conditions)
+    with pytest.raises(ValueError, match="eccentricity"):
+        stability_point(dataclasses.replace(case_1, eccentricity=1e-3), case_1.conditions)
+
+
+def test_process_damping_follows_the_tool_speed() -> None:
+    """A series at another speed is the problem of that speed: damping goes with 1/V."""
+    op = read_operation(shipped_operations()["thesis_table_4_11"])
+    family = depth_family(op, op.conditions, 3e-3)
+    found = abs(family.multipliers(family.series([2e-3, 3e-3]), 150.0)[1])
+    there = with_cut(op, tool_speed=150.0, depth=3e-3)
+    assert stability_point(op, there).spectral_radius == pytest.approx(found, abs=1e-4)
+    bare = dataclasses.replace(op, process_damping=None)
+    assert stability_point(bare, there).spectral_radius > found + 0.01
+
+
+@pytest.mark.parametrize("name", ["thesis_table_4_1", "thesis_table_4_2"])
+def test_turning_structures_follow_the_tool_speed(name: str) -> None:
+    op = read_operation(shipped_operations()[name])
+    family = depth_family(op, op.conditions, 2e-3)
+    speed = 1.2 * op.conditions.tool_speed
+    found = np.abs(family.multipliers(family.series([1e-3, 2e-3]), speed))
+    for depth, value in zip((1e-3, 2e-3), found, strict=True):
+        there = with_cut(op, tool_speed=speed, depth=depth)
+        assert stability_point(op, there).spectral_radius == pytest.approx(value, abs=1e-4 * max(1, value))
+
+
+def test_modes_that_depend_on_speed_are_taken_at_each_speed(milling: Operation) -> None:
+    """Half the frequency at half the speed and a quarter of the stiffness: lobes of the slower mode."""
+    mode = milling.tool.structure.modes[0]
+    slow = dataclasses.replace(mode, frequency=mode.frequency / 2)
+    table = ModeTable(("tool_speed",), ((250.0,), (600.0,)), ((slow,), (mode,)))
+    changing = dataclasses.replace(milling, tool=dataclasses.replace(
+        milling.tool, structure=dataclasses.replace(milling.tool.structure, modes=(slow,), table=table)))
+    lobes = stability_lobes(changing, [250.0, 600.0], [0.1e-3])
+    for j, (speed, only) in enumerate(((250.0, slow), (600.0, mode))):
+        plain = dataclasses.replace(milling, tool=dataclasses.replace(
+            milling.tool, structure=dataclasses.replace(milling.tool.structure, modes=(only,))))
+        expected = stability_point(plain, with_cut(plain, tool_speed=speed, depth=0.1e-3)).spectral_radius
+        assert lobes.spectral_radius[0, j] == pytest.approx(expected, abs=1e-4)

@@ -53,7 +53,8 @@ class Boundary:
     @property
     def depth_limit(self) -> Floats:
         """Lowest stability limit (n,) [m]; the searched depth where there is none."""
-        return np.array([s.intervals[0, 1] if s.intervals.size else 0.0 for s in self.stable])
+        return np.array([s.intervals[0, 1] if s.intervals.size and s.intervals[0, 0] == 0 else 0.0
+                         for s in self.stable])
 
 
 def stability_lobes(
@@ -111,7 +112,9 @@ def lowest_limit(depths: Floats, excess: Floats, at_zero: Floats) -> Floats:
     limit = np.full(excess.shape[1], depths[-1])
     for j, column in enumerate(excess.T):
         unstable = np.flatnonzero(column >= 0)
-        if unstable.size:
+        if at_zero[j] >= 0:
+            limit[j] = 0.0
+        elif unstable.size:
             place = np.concatenate([[0.0], depths[:unstable[0] + 1]])[-2:]
             value = np.concatenate([[at_zero[j]], column[:unstable[0] + 1]])[-2:]
             limit[j] = place[0] - value[0] * (place[1] - place[0]) / (value[1] - value[0])

@@ -35,8 +35,8 @@ def stability_problem(
 
     delay_model: "mean" (Eq. 4.88), "milling" or "first-principles"; see :mod:`turnmill_core.stability.delay`.
     position: axis positions for modes that depend on them, as in structure_at.
-    Raises ``ValueError`` for zero engagement, zero tool speed, a depth beyond the flutes, a rigid
-    structure, or an unknown delay model.
+    Raises ``ValueError`` for zero engagement, zero tool speed, a depth beyond the flutes, a rigid structure, an unknown
+    delay model, a tool that is no cylinder, and an eccentric or tilted one.
     """
     return depth_family(op, conditions, conditions.depth, delay_model, position).problem(conditions.depth)
 
@@ -139,6 +139,9 @@ def depth_family(
             f"at most the flute length {op.tool.flute_length} m")
     require(conditions.radial_immersion > 0, "radial immersion", conditions.radial_immersion, "m", "a number > 0")
     require(delay_model in DELAY_MODELS, "delay model", delay_model, "", f"one of {', '.join(DELAY_MODELS)}")
+    require(op.tool.shape.is_cylinder, "tool shape", op.tool.name, "", "a cylindrical tool: stability knows no other")
+    require(op.eccentricity == 0 and op.tilt == 0, "eccentricity and tilt", (op.eccentricity, op.tilt), "m, rad",
+            "0: stability knows orthogonal, centred turn-milling only")
     cut, kink = at_depth(op, conditions, deepest), 0.0
     if op.process == "milling":
         arcs = cutting_engagement.engagement(op, cut, np.zeros(1))

@@ -33,15 +33,15 @@ def stable_depths(
 
     tool_speed [rad/s] (None: the family's). searched [m]: at most the family's deepest cut, which None means. scan:
     equally spaced depths; an island thinner than searched / scan may be missed. tolerance: of a crossing, relative to
-    it. series: the scan's depths, where they are at hand. The first interval begins at 0, where the damped structure is
-    stable.
+    it. series: the scan's depths, where they are at hand. The first interval begins at 0 unless the structure alone is
+    unstable, as one that turns too fast.
     """
     deepest = family.conditions.depth if searched is None else searched
     series = family.series(np.linspace(0.0, deepest, scan + 1)[1:]) if series is None else series
     depths = np.concatenate([[0.0], series.heights[:, -1]])
     multipliers = np.concatenate([[np.exp(family.free_decay(tool_speed))], family.multipliers(series, tool_speed)])
     excess = np.log(np.abs(multipliers))
-    edges, beyond = [0.0], [0.0 + 0.0j]
+    edges, beyond = ([0.0], [0.0 + 0.0j]) if excess[0] < 0 else ([], [])
     for i in np.flatnonzero((excess[:-1] < 0) != (excess[1:] < 0)):
         depth, outside = crossing(family, tool_speed, depths[i:i + 2], multipliers[i:i + 2], tolerance)
         edges.append(depth)
