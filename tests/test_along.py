@@ -109,7 +109,7 @@ def dummy_table(path: Path, noise: float = 0.0) -> Path:
     op = read_operation(shipped_operations()["thesis_table_4_7"])
     beam = op.workpiece.beam
     assert beam is not None
-    f = np.arange(100.0, 1600.0, 2.0)
+    f = np.arange(100.0, 1600.0, 5.0)
     held = on_chuck(free_bar(stock_profile(op.workpiece), beam.material), beam.chuck_x)
     H = receptances(held, np.vstack([held.row(0.0), held.row(0.06)]), f)
     rng = np.random.default_rng(5)

@@ -55,7 +55,7 @@ def test_live(launched: Any, tmp_path: Path) -> None:
     path = tmp_path / "op.yaml"
     path.write_text(operation().text, encoding="utf-8")
     nodes = by_name(launched("live.launch.py", operation=str(path), bag="x.mcap", channels="2"))
-    assert nodes.keys() == KINDS.keys() - {"player"}
+    assert nodes.keys() == KINDS.keys() - {"player", "dashboard"}
     assert nodes["operation_server"].parameters[0]["operation_text"] == operation().text
     assert nodes["process_simulator"].parameters[0]["channels"] == ["sound", "tool_x"]
     assert "sensor_blocks=3" in nodes["process_simulator"].parameters[0]["match"]

@@ -14,7 +14,7 @@ from turnmill_ros.errors import InputError
 from turnmill_ros.frf_file import FrfFile, read_frfs
 from turnmill_ros.modal_fit import fit_modes
 
-F = np.arange(1.0, 1601.0)
+F = np.arange(2.0, 1601.0, 2.0)
 TRUE = {"xx": [(682.0, 0.0532, 1.303), (800.0, 0.0197, 1.635)], "yy": [(776.0, 0.032, 0.873)],
         "xy": [(326.0, 0.0072, -34.1), (774.0, 0.004, -40.7)]}
 
@@ -101,7 +101,7 @@ def universal(path: Path, sets: list[tuple[int, int, int, int]], quantity: int =
             binary=0, func_type=4, rsp_node=response, rsp_dir=rdir, ref_node=force, ref_dir=fdir, data=H, x=F,
             ordinate_spec_data_type=quantity, abscissa_spec_data_type=18, orddenom_spec_data_type=13, id1="", id2="",
             id3="", id4="", id5="", load_case_id=0, rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=5,
-            abscissa_spacing=1, num_pts=F.size, abscissa_min=1.0, abscissa_inc=1.0, z_axis_value=0.0))
+            abscissa_spacing=1, num_pts=F.size, abscissa_min=2.0, abscissa_inc=2.0, z_axis_value=0.0))
     pyuff.UFF(str(path)).write_sets(data, mode="overwrite")
     return path
 

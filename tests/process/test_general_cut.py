@@ -12,6 +12,7 @@ from tests.process.cases import ALUMINIUM, RPM, exact_config, milling, samples, 
 from tests.process.test_linear import made, nonlinear
 from tests.process.test_rigid import EDGES, VERY_STIFF
 from turnmill_core.cutting.engagement import Engagement, engagement
+from turnmill_core.cutting.loads import cutting_loads
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.machine.controller import axis_state_at
@@ -62,6 +63,17 @@ def test_tool_runs_into_a_block() -> None:
     assert 0.1 < np.abs(found[5000:6000, 0]).mean() / np.abs(found[-1000:, 0]).mean() < 0.9
 
 
+def test_an_eccentric_tool_cuts_as_the_cutting_room_says() -> None:
+    """Mean force of the simulation against the rigid cut with the numeric engagement."""
+    op = replace(turn_milling(VERY_STIFF, material=ALUMINIUM, depth=2e-3), eccentricity=3e-3)
+    found = samples(list(simulate(op, exact_config(90_000, CHANNELS), 0, duration=0.12)))[-1800:]
+    loads = cutting_loads(op, op.conditions)
+    assert found[:, :3].mean(axis=0) == pytest.approx(loads.force_tool_mean, abs=0.02 * np.abs(loads.force_tool_mean).max())
+    assert found[:, 3].mean() == pytest.approx(loads.tool_torque_mean, rel=0.02)
+    centred = cutting_loads(replace(op, eccentricity=0.0), op.conditions)
+    assert abs(centred.force_tool_mean[0] / loads.force_tool_mean[0] - 1) > 0.05  # it makes a difference
+
+
 def test_loads_of_both_spindles() -> None:
     """Torques of the simulation are those of the cutting room's rigid cut."""
     from turnmill_core.cutting.forces import revolution
@@ -102,6 +114,9 @@ def test_what_the_simulation_does_not_describe() -> None:
     for op, what in ((ball, "tool shape"), (turning, "frame")):
         with pytest.raises(ValueError, match=what):
             initial(op, config, 0)
-    eccentric = replace(turn_milling((Mode(600.0, 0.05, 1.0, X),)), eccentricity=2e-3)
+    bar = turn_milling((Mode(600.0, 0.05, 1.0, X),))
+    first = axis_state_at(bar, 0.0, 0)
+    given = engagement(bar, conditions_from_axes(bar, first), np.linspace(0.0, 2e-3, 5))
+    state, _ = step(config, initial(bar, config, 0), [first], [given])
     with pytest.raises(ValueError, match="engagements"):
-        step(config, initial(eccentric, config, 0), [axis_state_at(eccentric, 0.0, 0)])
+        step(config, state, [axis_state_at(bar, 0.01, 10_000_000)])

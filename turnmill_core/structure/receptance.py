@@ -157,8 +157,9 @@ def fit_chuck(
 ) -> Chuck:
     """One mode of the face and a joint with which the dummy comes nearest to its measured FRFs.
 
-    Arguments and errors as chuck_from_dummy. Least squares of the deviation relative to each FRF, from several
-    starting frequencies; the noise of the measurement is not sent through the decoupling.
+    bar, points [m], frequency [Hz] (k,), H11, H12, H22 [m/N] (k,) and errors: as in chuck_from_dummy. Least squares of
+    the deviation relative to each FRF, from several starting frequencies; the noise of the measurement is not sent
+    through the decoupling.
     """
     f, (A, T, Z), H = _dummy(bar, points, frequency, H11, H12, H22)
     size = np.abs(H) + 0.02 * np.abs(H).max(axis=0)
