@@ -48,7 +48,8 @@ PARENT_VARIABLE = "TURNMILL_PARENT"
 """Environment variable with the process id of the graph; a node ends when that process is gone."""
 
 GATHER_S = 0.008
-"""Pause between wakes of a process: what arrives meanwhile is handled at once, at half the cost at 250 Hz."""
+"""Pause between wakes of a process: what arrives meanwhile is handled at once, at half the cost at 250 Hz. A node whose
+answers may come later says so with an attribute `gather_s` [s]."""
 
 Transition = Callable[[Any, LifecycleState], TransitionCallbackReturn]
 
@@ -149,7 +150,7 @@ def main(create: Callable[[], Any]) -> None:
                 executor.spin_once(timeout_sec=0.1)
             except RCLError as error:  # somebody asked for a transition that this state does not have
                 node.get_logger().warning(str(error))
-            ending.wait(GATHER_S)
+            ending.wait(getattr(node, "gather_s", GATHER_S))
         stop(node)
     finally:
         failure = node.diagnostics.failure

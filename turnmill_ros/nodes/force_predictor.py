@@ -40,6 +40,8 @@ class ForcePredictor(LifecycleNode):
     Where force, torque or power is measured, the scale of the force coefficients comes with every window of it.
     """
 
+    gather_s = 0.016  # four axis states at 250 Hz, of which at most one is answered
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("force_predictor", **kwargs)
         self._rate = declare(
