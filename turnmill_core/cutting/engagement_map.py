@@ -126,39 +126,39 @@ def _contact(tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array) 
         return None
     require(math.isfinite(limit), "flute length", tool.flute_length, "m", "a finite length of a tool along the stock")
     heights = np.linspace(0.0, max(limit, 1e-9), _LEVELS)
-    hits = _levels(tool, workpiece, tip, columns, heights)
-    if not hits.any():
+    hits = np.flatnonzero(_levels(tool, workpiece, tip, columns, heights, 90))
+    if hits.size == 0:
         return None
-    first, last = int(hits.argmax()), len(hits) - 1 - int(hits[::-1].argmax())
-    low = 0.0 if first == 0 else heights[first - 1]
-    high = heights[min(last + 1, len(heights) - 1)]
-    for _ in range(2):  # the neighbours, divided again
-        near = np.linspace(heights[last], high, 9)
-        hit = _levels(tool, workpiece, tip, columns, near)
-        high = float(near[min(len(near) - 1, len(near) - int(hit[::-1].argmax()))]) if hit.any() else high
+    last = len(heights) - 1
+    low, high = float(heights[max(hits[0] - 1, 0)]), float(heights[min(hits[-1] + 2, last)])
+    near = np.linspace(heights[hits[-1]], high, 17)  # contact ends in a point: closer levels, and more of each
+    above = np.flatnonzero(_levels(tool, workpiece, tip, columns, near, 360))
+    high = float(near[min(above[-1] + 1, 16)]) if above.size else high
     top = min(high, tool.flute_length)
     return (low, top, high) if low < top else None
 
 
-def _levels(tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array, heights: Array) -> np.ndarray:
-    """Which circles of the tool at `heights` (n,) touch the uncut stock, bool (n,)."""
+def _levels(
+    tool: Tool, workpiece: SweptWorkpiece, tip: Array, columns: Array, heights: Array, angles: int
+) -> np.ndarray:
+    """Which circles of the tool at `heights` (n,) have one of `angles` points in the uncut stock, bool (n,)."""
     stock = workpiece.stock
     radii = outer_radius(tool, np.minimum(heights, tool.flute_length))
     hits = np.zeros(len(heights))
-    sweep.touching(tip, columns, stock.numbers, stock.z, stock.radius, radii, heights, 90, hits)
+    sweep.touching(tip, columns, stock.numbers, stock.z, stock.radius, radii, heights, angles, hits)
     return hits > 0
 
 
 def _earlier(tool: Tool, workpiece: SweptWorkpiece, now: Array, columns: Array, edges: EdgeElements) -> Array:
-    """Poses that may have swept what the edges meet, but for the last ones, less than a spacing away.
+    """Poses that may have swept what the edges meet, but for the last ones, less than two spacings away.
 
-    A convex tool leaves those behind; its own leading side was never in them.
+    A convex tool leaves those behind: its leading side was never in them, nor on the way from them.
     """
     newest = workpiece.poses
     for block in workpiece.blocks[::-1]:
         moved = (np.linalg.norm(block[:3] - now[:3, None], axis=0)
                  + 2 * tool.diameter * np.linalg.norm(block[3:6] - now[3:, None], axis=0))
-        away = np.flatnonzero(moved[::-1] >= workpiece.spacing)
+        away = np.flatnonzero(moved[::-1] >= 2 * workpiece.spacing)
         newest -= int(away[0]) if away.size else block.shape[1]
         if away.size:
             break

@@ -2,9 +2,8 @@
 
 A point of the stock is there until a pose of the tool has held it. The poses stay in memory, close enough
 together, and the tool is an exact body of revolution; so walls, cusps and undercuts of earlier passes are
-where they are: to the cusp s^2 / (8 R) that the spacing s leaves between two poses, and to a 64th of it because
-poses between them are looked at where a point is that close. Positions are in the workpiece frame W, which turns
-with the workpiece and coincides with the machine frame about the datum at c = 0.
+where they are; the way from one pose to the next counts as straight. Positions are in the workpiece frame W, which
+turns with the workpiece and coincides with the machine frame about the datum at c = 0.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.operation import Operation, Tool, outline, require
 
-SPACING = 1 / 25
-"""Distance of the poses over the tool radius; the cusp that matters is then radius / 320000."""
+SPACING = 1 / 20
+"""Distance of the poses over the tool radius."""
 
 MOST_POSES = 2_000_000
 """Poses that one workpiece may hold."""
@@ -71,17 +70,16 @@ class SweptWorkpiece:
 def profile_of(tool: Tool, spacing: float) -> Array:
     """Shape of the tool as the kernels take it (13,), see _kernels/sweep.py.
 
-    `spacing` [m]: distance of the poses, which makes the cusp between them.
+    `spacing` [m]: largest distance from a pose to the next.
     """
     shape, line = tool.shape, outline(tool.diameter, tool.flute_length, tool.shape)
-    cusp = spacing**2 / (8 * tool.radius)
     widest = max(line.top[0], line.corner_end[0], line.tip_end[0])
     if line.centre[1] < line.corner_end[1]:  # the arc bulges below its end
         widest = max(widest, line.centre[0] + shape.corner_radius)
     return read_only((
         math.tan(shape.tip_angle), line.tip_end[1], *line.centre, shape.corner_radius**2, line.corner_end[1],
         line.flank_foot, math.tan(shape.taper_angle), line.top[1], line.wiper_start, math.tan(shape.bottom_clearance),
-        (widest + cusp) ** 2, cusp))
+        (widest + spacing) ** 2, spacing))
 
 
 def stock_of(op: Operation) -> Stock:

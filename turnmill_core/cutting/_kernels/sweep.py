@@ -1,7 +1,7 @@
 """What an axisymmetric cutter has swept, point by point, and the arcs in which its surface meets material.
 
-Positions in metres in the workpiece frame, which turns with the workpiece. A pose is the tool tip, the tool axis, and
-what both change by to the next pose, a column (12, K); a profile the numbers of `swept.profile_of`; a stock those of
+Positions in metres in the workpiece frame, which turns with the workpiece. A pose is the tool tip, the tool axis, what
+both change by to the next pose, a column (12, K); a profile the numbers of `swept.profile_of`; a stock those of
 `swept.Stock`.
 """
 
@@ -23,15 +23,15 @@ TIGHT = 1e-9
 BLOCK = 32
 """Poses that are looked at together."""
 
-# places in a profile; slopes are tangents, WIDEST is squared, CUSP is left between two poses
+# places in a profile; slopes are tangents, WIDEST is squared and a STEP, the longest way to a next pose, too wide
 (TIP_SLOPE, TIP_END, CENTRE_RADIUS, CENTRE_HEIGHT, CORNER_SQUARE, CORNER_END, FOOT, TAPER_SLOPE, TOP, WIPER, DISH_SLOPE,
- WIDEST, CUSP) = range(13)
+ WIDEST, STEP) = range(13)
 
 
 @njit(cache=True)
-def within(profile: Array, square: float, z: float, margin: float) -> bool:
-    """Whether a point at the squared distance `square` from the axis and the height z is in the tool, or that close."""
-    if z < -margin or z > profile[TOP] or square >= profile[WIDEST]:
+def within(profile: Array, square: float, z: float) -> bool:
+    """Whether a point at the squared distance `square` from the tool axis and the height z is in the tool."""
+    if z < -TIGHT or z > profile[TOP] or square >= profile[WIDEST]:
         return False
     z = max(z, 0.0)
     if z < profile[TIP_END]:
@@ -41,11 +41,11 @@ def within(profile: Array, square: float, z: float, margin: float) -> bool:
         reach = profile[CENTRE_RADIUS] + math.sqrt(max(profile[CORNER_SQUARE] - d * d, 0.0))
     else:
         reach = profile[FOOT] + z * profile[TAPER_SLOPE]
-    reach += margin
+    reach += TIGHT
     if square >= reach * reach:
         return False
     if z < profile[WIPER] * profile[DISH_SLOPE]:
-        return bool(z > (profile[WIPER] - math.sqrt(square)) * profile[DISH_SLOPE] - margin)
+        return bool(z > (profile[WIPER] - math.sqrt(square)) * profile[DISH_SLOPE] - TIGHT)
     return True
 
 
@@ -75,12 +75,56 @@ def in_stock(stock: Array, z_knots: Array, radius_knots: Array, x: float, y: flo
 
 
 @njit(cache=True)
+def _on_the_way(profile: Array, poses: Array, k: int, x: float, y: float, z: float, t: float) -> bool:
+    """Whether the tool holds the point the part t of the way from pose k to the next."""
+    dx, dy, dz = x - poses[0, k] - t * poses[6, k], y - poses[1, k] - t * poses[7, k], z - poses[2, k] - t * poses[8, k]
+    h = (dx * (poses[3, k] + t * poses[9, k]) + dy * (poses[4, k] + t * poses[10, k])
+         + dz * (poses[5, k] + t * poses[11, k]))
+    return within(profile, dx * dx + dy * dy + dz * dz - h * h, h)
+
+
+@njit(cache=True)
+def _holds(profile: Array, poses: Array, k: int, x: float, y: float, z: float) -> bool:
+    """Whether the tool holds the point at pose k or on the way to the next.
+
+    On the way the point is looked at where it comes closest to the tool axis while it is above the tip, and where it
+    comes closest to the centre of a ball; the tool is convex, so elsewhere it is no deeper in it but for a trifle.
+    """
+    dx, dy, dz = x - poses[0, k], y - poses[1, k], z - poses[2, k]
+    ax, ay, az = poses[3, k], poses[4, k], poses[5, k]
+    h = dx * ax + dy * ay + dz * az
+    if within(profile, dx * dx + dy * dy + dz * dz - h * h, h):
+        return True
+    vx, vy, vz, wx, wy, wz = poses[6, k], poses[7, k], poses[8, k], poses[9, k], poses[10, k], poses[11, k]
+    after = (dx - vx) * (ax + wx) + (dy - vy) * (ay + wy) + (dz - vz) * (az + wz)
+    if h < 0.0 and after < 0.0:
+        return False
+    rise = vx * ax + vy * ay + vz * az
+    sx, sy, sz = vx - rise * ax + h * wx, vy - rise * ay + h * wy, vz - rise * az + h * wz
+    square = sx * sx + sy * sy + sz * sz
+    t = 0.5 if square == 0.0 else (dx * sx + dy * sy + dz * sz) / square
+    if h < 0.0:
+        t = max(t, h / (h - after))
+    elif after < 0.0:
+        t = min(t, h / (h - after))
+    if 0.0 < t < 1.0 and _on_the_way(profile, poses, k, x, y, z, t):
+        return True
+    if profile[CORNER_SQUARE] > 0.0:
+        f = profile[CENTRE_HEIGHT]
+        sx, sy, sz = vx + f * wx, vy + f * wy, vz + f * wz
+        square = sx * sx + sy * sy + sz * sz
+        t = 0.5 if square == 0.0 else ((dx - f * ax) * sx + (dy - f * ay) * sy + (dz - f * az) * sz) / square
+        return 0.0 < t < 1.0 and _on_the_way(profile, poses, k, x, y, z, t)
+    return False
+
+
+@njit(cache=True)
 def covered_by(profile: Array, poses: Array, x: float, y: float, z: float, hint: int) -> int:
     """Index of a pose (columns of poses) whose tool holds the point, `hint` tried first; -1 where there is none."""
     if 0 <= hint < poses.shape[1] and _holds(profile, poses, hint, x, y, z):
         return hint
     tip_x, tip_y, tip_z, axis_x, axis_y, axis_z = poses[0], poses[1], poses[2], poses[3], poses[4], poses[5]
-    lowest, highest, widest = -profile[CUSP], profile[TOP], profile[WIDEST]
+    lowest, highest, widest = -profile[STEP], profile[TOP], profile[WIDEST]
     n = poses.shape[1]
     for first in range(0, n, BLOCK):
         last = min(first + BLOCK, n)
@@ -92,29 +136,13 @@ def covered_by(profile: Array, poses: Array, x: float, y: float, z: float, hint:
             candidates += (square < widest) & (h > lowest) & (h <= highest)
         if candidates > 0:
             for k in range(first, last):
+                dx, dy, dz = x - tip_x[k], y - tip_y[k], z - tip_z[k]
+                h = dx * axis_x[k] + dy * axis_y[k] + dz * axis_z[k]
+                if h <= lowest or dx * dx + dy * dy + dz * dz - h * h >= widest:
+                    continue
                 if _holds(profile, poses, k, x, y, z):
                     return k
     return -1
-
-
-@njit(cache=True)
-def _holds(profile: Array, poses: Array, k: int, x: float, y: float, z: float) -> bool:
-    """Whether the tool holds the point at pose k or, where it nearly does, within half a step of it."""
-    dx, dy, dz = x - poses[0, k], y - poses[1, k], z - poses[2, k]
-    h = dx * poses[3, k] + dy * poses[4, k] + dz * poses[5, k]
-    square = dx * dx + dy * dy + dz * dz - h * h
-    if not within(profile, square, h, profile[CUSP]):
-        return False
-    if within(profile, square, h, TIGHT):
-        return True
-    for i in range(1, 5):
-        for t in (i / 8, -i / 8):
-            sx, sy, sz = dx - t * poses[6, k], dy - t * poses[7, k], dz - t * poses[8, k]
-            h = (sx * (poses[3, k] + t * poses[9, k]) + sy * (poses[4, k] + t * poses[10, k])
-                 + sz * (poses[5, k] + t * poses[11, k]))
-            if within(profile, sx * sx + sy * sy + sz * sz - h * h, h, TIGHT):
-                return True
-    return False
 
 
 @njit(cache=True)
@@ -273,6 +301,47 @@ def arcs(
                 start[k, found], stop[k, found] = begin, high
             found += 1
         most = max(most, found)
+    for turn in range(2 * radius.size - 2):  # up, then down: arcs that are narrower than a step, beside a wider one
+        k = turn + 1 if turn < radius.size - 1 else 2 * radius.size - 3 - turn
+        beside = k - 1 if turn < radius.size - 1 else k + 1
+        low, high = _leading(feed[k])
+        for arc in range(start.shape[1]):
+            if high <= low or not start[beside, arc] < stop[beside, arc]:
+                break
+            phi = (start[beside, arc] + stop[beside, arc]) / 2
+            phi += 2 * math.pi * math.floor((high - phi) / (2 * math.pi))
+            place = 0
+            while place < start.shape[1] and stop[k, place] < phi:
+                place += 1
+            if phi <= low or place == start.shape[1] or start[k, place] <= phi:
+                continue
+            now, hint = _probe(radius[k], height[k], phi, where, profile, poses, ball, inner, hint)
+            if now:
+                room = (high - low) / max(4, math.ceil((high - low) / step))
+                first, last = max(low, phi - room), min(high, phi + room)
+                if place > 0:
+                    first = max(first, stop[k, place - 1])
+                if start[k, place] < last:
+                    last = start[k, place]
+                for i in range(start.shape[1] - 1, place, -1):
+                    start[k, i], stop[k, i] = start[k, i - 1], stop[k, i - 1]
+                for side, edge in enumerate((first, last)):
+                    inside, outside = phi, edge
+                    while abs(outside - inside) > tolerance:
+                        c = (inside + outside) / 2
+                        at, hint = _probe(radius[k], height[k], c, where, profile, poses, ball, inner, hint)
+                        if at:
+                            inside = c
+                        else:
+                            outside = c
+                    if side == 0:
+                        start[k, place] = (inside + outside) / 2
+                    else:
+                        stop[k, place] = (inside + outside) / 2
+                count = 0
+                while count < start.shape[1] and start[k, count] < stop[k, count]:
+                    count += 1
+                most = max(most, count + 1)
     return most
 
 
