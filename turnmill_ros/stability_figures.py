@@ -95,7 +95,7 @@ def trial_groups(trials: Sequence[JudgedTrial]) -> dict[tuple[str, bool], list[J
 
 
 def _marks(plot: figure, found: Diagrams, workpiece_speed: float) -> None:
-    if abs(found.cut.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed):
+    if found.cut_at(workpiece_speed):
         plot.scatter([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], size=15, marker="star", color="#ffffff",
                      line_color="#000000", line_width=1.5, legend_label="operating point")
     for (outcome, agrees), group in sorted(trial_groups(found.trials_at(workpiece_speed)).items()):

@@ -65,7 +65,7 @@ def _diagram(axes: Any, found: Diagrams, part: Lobes | Boundary) -> None:
 
 def _marks(axes: Any, found: Diagrams, workpiece_speed: float) -> list[Any]:
     handles = []
-    if abs(found.cut.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed):
+    if found.cut_at(workpiece_speed):
         handles += axes.plot([found.cut.tool_speed * RPM], [found.cut.depth * 1e3], "*", markersize=15,
                              markerfacecolor="white", markeredgecolor="black", label="operating point")
     for (outcome, agrees), group in sorted(trial_groups(found.trials_at(workpiece_speed)).items()):

@@ -44,9 +44,17 @@ class Diagrams:
         return float(first.depths[-1]) if isinstance(first, Lobes) else first.deepest
 
     def trials_at(self, workpiece_speed: float) -> tuple[JudgedTrial, ...]:
-        """The trials at a workpiece speed [rad/s], to a hundredth."""
+        """The trials at a workpiece speed [rad/s], to a hundredth, that lie in the diagram."""
         return tuple(t for t in self.trials
-                     if abs(t.trial.workpiece_speed - workpiece_speed) <= 0.01 * abs(workpiece_speed))
+                     if self._shows(t.trial.workpiece_speed, t.trial.tool_speed, workpiece_speed))
+
+    def cut_at(self, workpiece_speed: float) -> bool:
+        """Whether the operating point lies in the diagram of a workpiece speed [rad/s]."""
+        return self._shows(self.cut.workpiece_speed, self.cut.tool_speed, workpiece_speed)
+
+    def _shows(self, workpiece_speed: float, tool_speed: float, of: float) -> bool:
+        speeds = self.parts[0].tool_speeds
+        return abs(workpiece_speed - of) <= 0.01 * abs(of) and bool(speeds[0] <= tool_speed <= speeds[-1])
 
 
 def diagrams_document(found: Diagrams) -> dict[str, Any]:
