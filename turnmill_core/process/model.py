@@ -30,6 +30,7 @@ SPINDLE = AXES.index("s")
 LAG_PER_SLICE = 0.02
 MOST_SLICES = 32
 ARCS = 3
+GENERAL_SLICES = 24  # where the engagement differs from height to height
 TRUTH_HOP = 0.03  # s, about
 
 
@@ -94,7 +95,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth,
                         pitch.max()]),
         coefficients=np.array([material.Ktc, material.Krc, material.Kac, *edge, *damping]),
-        slices=config.slices or min(MOST_SLICES, max(1, math.ceil(lag / LAG_PER_SLICE))),
+        slices=config.slices or min(MOST_SLICES, max(GENERAL_SLICES if op.eccentricity else 1,
+                                                     math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
         taps=antialias_taps(config.ratio), columns=tuple(integrator.RAW.index(name) for name in config.channels),
         teeth=tool.teeth, turns=principal_turns(tool),

@@ -21,12 +21,14 @@ from numpy.typing import NDArray
 
 from turnmill_core.cutting.engagement import Engagement
 from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.machine.controller import axis_state_at, schedule_duration
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.operation import Operation, require
 from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
-from turnmill_core.process.model import ARCS, ProcessModel, general_engagement, knot, process_model
+from turnmill_core.process.engagement_path import steady_engagement
+from turnmill_core.process.model import ARCS, GENERAL_SLICES, ProcessModel, general_engagement, knot, process_model
 from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
 from turnmill_core.process.truth import MARKS_PER_TURN, Truth, join_truth, truth_of_marks
 
@@ -108,7 +110,7 @@ def step(
     """Integrate over the axis states `axes`, which follow those of earlier steps.
 
     engagements: where the edges are in the cut at each axis state, in place of the closed form (in every step, or in
-    none).
+    none; None for an eccentric tool: those of the steady cut).
 
     The first axis state of all is time 0, and the first sample is taken there. Samples come out a
     few milliseconds behind the axis states, because the anti-alias filter looks ahead; their stamps
@@ -120,13 +122,16 @@ def step(
     base_ns = state.base_ns if len(state.knot) else chunk[0].stamp_ns
     rows = [knot(state.model, a, base_ns) for a in chunk]
     arcs: list[Floats] = []
+    op = state.model.op
+    if engagements is None and op.eccentricity:
+        engagements = [steady_engagement(op, conditions_from_axes(op, a)) for a in chunk]
     if engagements is not None:
         require(len(engagements) == len(chunk), "engagements", len(engagements), "",
                 f"one per axis state, {len(chunk)}")
         general = [general_engagement(state.model, *pair) for pair in zip(rows, engagements, strict=True)]
         rows, arcs = [row for row, _ in general], [found[None] for _, found in general]
-    elif state.model.op.eccentricity or len(state.arcs):
-        raise ValueError("engagements are None, expected one per axis state: the cut has no closed form here")
+    elif len(state.arcs):
+        raise ValueError("engagements are None, expected one per axis state as in the steps before")
     knots = np.concatenate([state.knot, np.array(rows)])
     around = np.concatenate([state.arcs, *arcs])
     stamps = knots[:, integrator.TIME]
@@ -155,6 +160,8 @@ def simulate(
     end = schedule_duration(op) if duration is None else duration
     require(end > 0, "duration", end, "s", "a number > 0 (the operation has no schedule)")
     blocks = int(end * config.sample_rate + 1e-6) // config.block_samples
+    if engagement_at is not None and not config.slices:
+        config = replace(config, slices=GENERAL_SLICES)
     state = initial(op, config, seed)
     per_chunk = max(1, round(config.axes_rate * config.block_samples / config.sample_rate))
     index = made = 0

@@ -103,10 +103,15 @@ def printed_extremes(op: Operation, conditions: Conditions, angle: Floats, axial
 def steady_axial(op: Operation, conditions: Conditions, steps: int | None = None) -> tuple[Floats, Floats]:
     """Steady vibration along the tool axis over a tool revolution, from the periodic orbit of the linear cut.
 
+    Cuts without a closed form (eccentric tools, tools that are no cylinder) have no stability problem to take the orbit
+    from; they get forced_response.
     steps: of the map over its period (None: default_steps). Returns tool angle [rad] (p,), equally spaced from 0, and
     displacement [m] (p,) of the tool against the workpiece along +z_T; zeros where no mode moves along the axis.
     """
     if not moves_axially(op, conditions):
         return np.zeros(1), np.zeros(1)
+    if op.eccentricity or not op.tool.shape.is_cylinder:
+        angle, moved = forced_response(op, conditions)
+        return angle, np.ascontiguousarray(moved[:, 2])
     steady = periodic_orbit(linear_map(linear_cut(op, conditions), steps))
     return steady.angle, steady.relative[:, 2]
