@@ -38,11 +38,12 @@ class Judgement:
 
 
 def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, chattering: bool,
-          prior: Prior | None, warning: float = math.inf, risen: float = 1.0) -> Judgement:
+          prior: Prior | None, warning: float = math.inf, risen: float = 1.0, entering: bool = False) -> Judgement:
     """State of a window from its features.
 
     chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
-    growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there.
+    growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
+    entering: out of the cut before, and the signal at least doubles within the window.
     """
     own = [x for x in f.lines if x.energy > 4 * background.line_energy(x.frequency)]
     asynchronous = sum(x.energy for x in own)
@@ -57,9 +58,11 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
         kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
         text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
-    if not chattering and kind is not ChatterKind.STABLE and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT:
+    changing = not chattering and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT
+    if kind is not ChatterKind.STABLE and (changing or entering):
         kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
-        text = f"entry or exit: the tooth passing harmonics change {f.change:.2g}-fold within the window; else {text}"
+        what = "the tooth passing harmonics change" if changing else "the signal changes"
+        text = f"entry or exit: {what} {f.change if changing else 2:.2g}-fold or more within the window; else {text}"
     return Judgement(kind, reason, text, ratio, half)
 
 
@@ -117,25 +120,42 @@ class Held:
     count: int = 0
 
 
-def persist(config: ChatterConfig, held: Held, kind: ChatterKind, plain: bool) -> Held:
+def persist(config: ChatterConfig, held: Held, kind: ChatterKind, enter: int) -> Held:
     """Held state after a window judged `kind`: a change needs its dwell of windows in a row that agree.
 
-    Chatter must last longer where nothing else showed the cut (lone_dwell), neither a plain comb now nor a
-    cut before it: machine sounds out of the cut can look like a family for some tenths of a second.
+    enter: windows that chatter needs (see :func:`windows_to_enter`).
     """
     if kind == held.kind:
         return Held(kind, kind, 0)
     if kind is ChatterKind.UNKNOWN:
         return Held()
     count = held.count + 1 if kind == held.rival or (kind in CHATTER and held.rival in CHATTER) else 1
-    if count >= _dwell(config, held.kind, kind, plain):
+    if count >= _dwell(config, held.kind, kind, enter):
         return Held(kind, kind, 0)
     return Held(held.kind, kind, count)
 
 
-def _dwell(config: ChatterConfig, old: ChatterKind, new: ChatterKind, plain: bool) -> int:
+LOUD = 1.5
+"""Level over what the gate asks for, from which chatter alone shows a cut in half the time."""
+
+
+def windows_to_enter(config: ChatterConfig, f: Features, background: Background, held: Held, growing: bool) -> int:
+    """Windows in a row that chatter must last before it begins.
+
+    One in a cut where a steady growth over several windows has led to it (growing), else enter_dwell. Longer where
+    nothing else shows a cut, neither a plain comb now nor a cut before: machine sounds out of the cut can look like
+    a family for some tenths of a second; half as long where it is far louder than the air before.
+    """
+    if plain_comb(f) or held.kind not in (ChatterKind.AIR, ChatterKind.UNKNOWN):
+        return 1 if growing else config.enter_dwell
+    floor = background.energy if config.noise_floor is None else config.noise_floor**2
+    loud = math.isfinite(floor) and f.energy > (LOUD * config.gate_ratio) ** 2 * floor
+    return max(config.enter_dwell, config.lone_dwell // 2 if loud else config.lone_dwell)
+
+
+def _dwell(config: ChatterConfig, old: ChatterKind, new: ChatterKind, enter: int) -> int:
     if new in CHATTER:
-        return config.lone_dwell if not plain and old in (ChatterKind.AIR, ChatterKind.UNKNOWN) else config.enter_dwell
+        return enter
     if old in CHATTER:
         return config.leave_dwell
     if ChatterKind.AIR in (old, new) and old is not ChatterKind.UNKNOWN:

@@ -42,7 +42,13 @@ LARGEST_RAMP = 0.01
 
 
 COMB_SHARE = 0.05
-"""Share of the synchronous energy from which the tooth passing harmonics alone tell the speed; else all do."""
+"""Share of the synchronous energy from which the tooth passing harmonics alone tell the speed.
+
+Else all spindle harmonics do, if there are four or more and none holds most of the energy, as a chatter line would.
+"""
+
+CALM = 0.1
+"""Asynchronous over synchronous energy below which nothing speaks against the speed."""
 
 CANDIDATES = 4
 """Strongest lines that are tried as H."""
@@ -118,13 +124,18 @@ class _Parts:
 
 
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
-             band: tuple[float, float]) -> Features:
+             band: tuple[float, float], wide: tuple[float, float] | None = None) -> Features:
     """Features of a window.
 
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
-    [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`.
+    [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; wide: further
+    band in which another speed is taken where it leaves a quarter of the asynchronous energy or less.
     """
     parts, ratio = _followed(p, turns, steady, teeth, lowest, ratio, band)
+    if wide is not None and parts.residual.power.sum() > CALM * parts.one.energy().sum():
+        other, at = _followed(p, turns, steady, teeth, lowest, ratio, wide)
+        if other.residual.power.sum() < 0.25 * parts.residual.power.sum():
+            parts, ratio = other, at
     layout, found = parts.layout, parts.residual
     tooth_frequency = teeth * layout.frequency
     noise = harmonic_noise(found, len(parts.one.mean), layout.frequency, 1, layout.duration)
@@ -214,7 +225,8 @@ def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
     power = np.abs(parts.one.mean[harmonics]) ** 2
     power[power < 20 * noise[harmonics]] = 0.0
     tooth = harmonics % teeth == 0
-    if power[tooth].sum() >= COMB_SHARE * power.sum():
+    several = np.count_nonzero(power) >= 4 and power.max() < 0.6 * power.sum()
+    if power[tooth].sum() >= COMB_SHARE * power.sum() or not several:
         harmonics = harmonics[tooth]
     return drift(parts.layout, parts.one, harmonics, noise[harmonics])
 

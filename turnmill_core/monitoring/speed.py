@@ -129,7 +129,8 @@ def overruled(s: Spectrum, tooth_frequency: float, ratios: Array, held: float, b
 
     held: ratio believed so far, within +-band of which a comb counts for it; s: spectrum of a window in which the
     speed is constant; tooth_frequency [Hz] as measured; ratios: trial ratios. Each harmonic counts with the
-    logarithm of power over floor, at the tops of the peaks only; two plain lines more are needed.
+    logarithm of power over floor, at the tops of the peaks only; two plain lines more are needed, and a third of the
+    first twelve harmonics.
     """
     count = min(20, int(len(s.power) * s.step * 0.98 / (tooth_frequency * ratios[-1])))
     if count < 1:
@@ -138,10 +139,13 @@ def overruled(s: Spectrum, tooth_frequency: float, ratios: Array, held: float, b
     excess = np.log1p(np.minimum(s.power / s.floor, 1000.0)) * (s.power / top)
     excess[top < PLAIN * s.floor] = 0.0
     position = np.outer(ratios, np.arange(1, count + 1)) * (tooth_frequency / s.step)
-    scores = excess[np.minimum(np.rint(position).astype(int), len(excess) - 1)].sum(axis=1)
+    seen = excess[np.minimum(np.rint(position).astype(int), len(excess) - 1)]
+    scores = seen.sum(axis=1)
     best = int(np.argmax(scores))
     near_held = float(scores[np.abs(ratios - held) <= band].max(initial=0.0))
-    return float(ratios[best]) if scores[best] > near_held + (9.0 if count > 1 else 5.0) else held
+    plain = int(np.sum(seen[best, :12] > math.log(PLAIN) / 2))
+    far = scores[best] > near_held + (9.0 if count > 1 else 5.0)
+    return float(ratios[best]) if far and plain >= min(count, max(2, -(-min(count, 12) // 3))) else held
 
 
 PLAIN = 30.0

@@ -12,8 +12,8 @@ from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.blocks import Channel, Status
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
-from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist
-from turnmill_core.monitoring.features import Features, features
+from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
+from turnmill_core.monitoring.features import CALM, Features, features
 from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
 from turnmill_core.monitoring.sensors import implausible
@@ -41,8 +41,11 @@ LARGEST_SPREAD = 0.1
 FEWEST_REVOLUTIONS = 6
 SCORE_MEMORY = 0.9
 
-LOOK_EVERY = 4
+LOOK_EVERY = 1
 """A wrong tachometer is looked for in every fourth window (windows overlap by three quarters or more)."""
+
+SURE = 5
+"""Calm windows after which the ratio of true to measured speed is no longer sought far away."""
 
 PULL = 0.3
 """Turn of the first tooth passing harmonic's phase over a window [revolutions] that still tells the speed's error."""
@@ -52,7 +55,7 @@ PULL = 0.3
 class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
     ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
-    ratio around which the measured speed is refined."""
+    ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
@@ -60,6 +63,7 @@ class Tracker:
     ratio: float = 1.0
     history: tuple[Seen, ...] = ()
     middle: float = 1.0
+    calm: int = 0
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -121,21 +125,23 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
         middle = ratio
     else:
         middle = tracker.middle
-        if steady and (blank.last_sample + 1) // round(config.hop * rate) % LOOK_EVERY == 0:
+        if steady and tracker.calm < SURE and (blank.last_sample + 1) // round(config.hop * rate) % LOOK_EVERY == 0:
             tooth_frequency = config.principal_teeth * turned.mean / (2 * math.pi)
             middle = overruled(spectrum(p.samples, p.rate, p.top), tooth_frequency, ratio_grid(config.nominal_band),
                                middle, config.axis_band)
-    told = PULL / (config.principal_teeth * float(turns[-1] - turns[0]))
-    wide = max(config.axis_band, min(config.nominal_band, told))
-    band = (middle - wide, middle + wide)
+    told = min(config.nominal_band, PULL / (config.principal_teeth * float(turns[-1] - turns[0])))
+    wide = (middle - told, middle + told) if tracker.calm < SURE and told > config.axis_band else None
+    band = (middle - config.axis_band, middle + config.axis_band)
     ratio = min(band[1], max(band[0], ratio))
-    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band)
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
     risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
-    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen)
-    held = persist(config, tracker.held, judgement.kind, plain_comb(f))
+    entering = tracker.held.kind in (ChatterKind.AIR, ChatterKind.UNKNOWN) and _doubles(p.samples)
+    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering)
+    enter = windows_to_enter(config, f, tracker.background, tracker.held, risen > 1)
+    held = persist(config, tracker.held, judgement.kind, enter)
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
         background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
@@ -143,9 +149,10 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
-    if plain_comb(f):
-        middle += min(config.axis_band, max(-config.axis_band, f.speed_ratio - middle))
-    return Tracker(held, background, scores, f.speed_ratio, history, middle), verdict
+    calm = tracker.calm
+    if plain_comb(f) and abs(math.log(f.change)) < 0.3 and sum(x.energy for x in f.lines) < CALM * f.synchronous:
+        middle, calm = f.speed_ratio, min(SURE, calm + 1)
+    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
@@ -156,6 +163,12 @@ def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid
         scores = scores + family_score(whole, strongest[0].frequency, frequency, config.principal_teeth, grid)
     found: Array = scores - 0.3 * ((grid - 1) / config.nominal_band) ** 2
     return found
+
+
+def _doubles(x: Array) -> bool:
+    """True where the amplitude of the second half is more than twice that of the first."""
+    early, late = np.array_split(x, 2)
+    return bool(late.var() > 4 * early.var())
 
 
 def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
