@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from tests.process.cases import BENCHMARK_MODE, exact_config, milling, samples, turn_milling
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.operation import Mode, Operation
-from turnmill_core.process._kernels import integrator
+from turnmill_core.process._kernels import filters, integrator, interpolation
 from turnmill_core.process.model import knot, process_model
 from turnmill_core.process.simulation import initial, step
 
@@ -44,8 +44,10 @@ def test_the_compiled_integrator_is_the_plain_one(name: str, monkeypatch: pytest
         return [*state, marks]
 
     compiled = advance(integrator.advance)
-    for inner in ("_ramp", "_left", "_hermite", "_cut", "_leave_surface", "_move"):
-        monkeypatch.setattr(integrator, inner, getattr(integrator, inner).py_func)
+    for module, inner in ((interpolation, "ramp"), (interpolation, "ramp_integral"), (integrator, "past"),
+                          (integrator, "surface_at"), (integrator, "hermite"), (integrator, "_cut"),
+                          (integrator, "_leave_surface"), (integrator, "_move")):
+        monkeypatch.setattr(module, inner, getattr(module, inner).py_func)
     plain = advance(integrator.advance.py_func)
     assert np.abs(plain[4][:, 8]).max() > 1
     for a, b in zip(compiled, plain, strict=True):
@@ -90,28 +92,28 @@ def test_decimation_is_a_convolution() -> None:
     taps = np.hanning(41)
     phases = np.ascontiguousarray(rows.reshape(3, 100, 4).transpose(0, 2, 1))
     out = np.full((3, 90), np.nan)
-    integrator.decimate(phases, taps, out)
+    filters.decimate(phases, taps, out)
     expected = np.stack([np.convolve(row, taps, "valid")[::4][:90] for row in rows])
     np.testing.assert_allclose(out, expected, atol=1e-12)
     plain = np.empty_like(out)
-    integrator.decimate.py_func(phases, taps, plain)
+    filters.decimate.py_func(phases, taps, plain)
     np.testing.assert_allclose(out, plain, atol=1e-13)
 
 
 def test_first_order_noise_is_a_recursive_filter() -> None:
     white = np.random.default_rng(2).normal(size=300)
     out = np.empty(300)
-    last = integrator.first_order(white, 0.9, 0.4, out)
+    last = filters.first_order(white, 0.9, 0.4, out)
     expected = lfilter([1.0], [1.0, -0.9], white, zi=np.array([0.9 * 0.4]))[0]
     np.testing.assert_allclose(out, expected, atol=1e-12)
-    assert last == out[-1] == integrator.first_order.py_func(white, 0.9, 0.4, np.empty(300))
+    assert last == out[-1] == filters.first_order.py_func(white, 0.9, 0.4, np.empty(300))
 
 
 @pytest.mark.parametrize("u", [-1.5, -1.0, -0.3, 0.0, 0.4, 1.0, 2.0])
 def test_edges_are_averaged_with_a_hat(u: float) -> None:
     s = np.linspace(-1, 1, 200_001)
     expected = float(np.mean((1 - np.abs(s)) * (u + s >= 0)) * 2)
-    assert integrator._ramp.py_func(u) == integrator._ramp(u) == pytest.approx(expected, abs=1e-4)
+    assert interpolation.ramp.py_func(u) == interpolation.ramp(u) == pytest.approx(expected, abs=1e-4)
 
 
 def test_the_surface_is_read_as_a_cubic() -> None:
@@ -120,7 +122,8 @@ def test_the_surface_is_read_as_a_cubic() -> None:
     rows = np.stack([1 + 0.1 * t + 0.02 * t**2 - 0.001 * t**3, 0.5 * t], axis=1)
     for position in (3.25, 17.5, 36.9):
         expected = 0.6 * (1 + 0.1 * position + 0.02 * position**2 - 0.001 * position**3) + 0.8 * 0.5 * position
-        assert integrator._left(rows, position, 0.6, 0.8) == pytest.approx(expected, rel=1e-12)
-        assert integrator._left.py_func(rows, position + 400, 0.6, 0.8) == pytest.approx(expected, rel=1e-9)
+        assert interpolation.surface_at(rows, position, 0.6, 0.8) == pytest.approx(expected, rel=1e-12)
+        assert interpolation.surface_at.py_func(rows, position + 400, 0.6, 0.8) == pytest.approx(expected, rel=1e-9)
     periodic = np.stack([np.sin(2 * np.pi * t / 40), np.zeros(40)], axis=1)
-    assert integrator._left(periodic, 39.6, 1.0, 0.0) == pytest.approx(math.sin(2 * math.pi * 39.6 / 40), abs=1e-4)
+    expected = math.sin(2 * math.pi * 39.6 / 40)
+    assert interpolation.surface_at(periodic, 39.6, 1.0, 0.0) == pytest.approx(expected, abs=1e-4)

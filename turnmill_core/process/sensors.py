@@ -19,7 +19,7 @@ from scipy.signal import firwin, kaiser_beta
 
 from turnmill_core.monitoring.blocks import Channel
 from turnmill_core.operation import Mode, Vector, require
-from turnmill_core.process._kernels import integrator
+from turnmill_core.process._kernels.filters import first_order
 
 Floats = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def ambient_sound(
     pole = math.exp(-2 * math.pi * model.background_corner / sample_rate)
     white = model.background * math.sqrt(1 - pole**2) * white_noise(seed, 0, first, count)
     sound = np.empty(count)
-    last = integrator.first_order(white, pole, last, sound)
+    last = first_order(white, pole, last, sound)
     time = (first + np.arange(count)) / sample_rate
     for i, tone in enumerate(model.tones):
         phase = tone.order * tool_angle + 2 * math.pi * tone.frequency * time

@@ -26,6 +26,7 @@ from turnmill_core.machine.controller import axis_state_at, schedule_duration
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.operation import Operation, require
 from turnmill_core.process._kernels import integrator
+from turnmill_core.process._kernels.filters import decimate
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.engagement_path import steady_engagement
 from turnmill_core.process.model import ARCS, GENERAL_SLICES, ProcessModel, general_engagement, knot, process_model
@@ -259,7 +260,7 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
     used[:, : len(taken)] = taken.T
     phases = np.ascontiguousarray(used.reshape(len(model.columns), length, ratio).transpose(0, 2, 1))
     filtered = np.empty((len(model.columns), count))
-    integrator.decimate(phases, model.taps, filtered)
+    decimate(phases, model.taps, filtered)
     signals = filtered.T.copy()
     background = state.background
     for c, name in enumerate(config.channels):

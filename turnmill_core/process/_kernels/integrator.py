@@ -1,4 +1,4 @@
-"""Compiled loops of the process simulator: the nonlinear cut, and what its sensors do.
+"""Compiled loop of the process simulator: the nonlinear cut.
 
 `advance.py_func` is the plain version of the integrator; tests/process compare the two bit by bit,
 and hold both against independent solutions.
@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from turnmill_core.process._kernels.interpolation import hermite, past, surface_at
 
 Floats = NDArray[np.float64]
 
@@ -41,66 +43,6 @@ FIRST_VELOCITY = RAW.index("tool_velocity_x")
 ANGLE, PSI, LAST_DEPTH, CHIP, NEXT_MARK = range(5)
 SCALARS = 5
 TIME_TOLERANCE = 0.5e-9
-
-
-@njit(cache=True, error_model="numpy")
-def _ramp(u: float) -> float:
-    """Step function averaged with a hat of width one step; u in steps past the edge."""
-    if u <= -1.0:
-        return 0.0
-    if u >= 1.0:
-        return 1.0
-    if u < 0.0:
-        return 0.5 * (1.0 + u) * (1.0 + u)
-    return 1.0 - 0.5 * (1.0 - u) * (1.0 - u)
-
-
-@njit(cache=True, error_model="numpy")
-def _ramp_integral(u: float) -> float:
-    """Integral of _ramp from minus infinity to u."""
-    if u <= -1.0:
-        return 0.0
-    if u >= 1.0:
-        return u
-    if u < 0.0:
-        return (1.0 + u) ** 3 / 6.0
-    return u + (1.0 - u) ** 3 / 6.0
-
-
-@njit(cache=True, error_model="numpy")
-def _past(u: float, length: float) -> float:
-    """Share of a slice, `length` steps long, that has passed an edge, averaged over a step; u: its middle."""
-    if length < 1e-3:
-        return _ramp(u)
-    return (_ramp_integral(u + 0.5 * length) - _ramp_integral(u - 0.5 * length)) / length
-
-
-@njit(cache=True, error_model="numpy")
-def _left(rows: Floats, position: float, sin: float, cos: float) -> float:
-    """Surface [m] seen along (sin, cos) at a fractional `position` of the periodic table rows (cells, 2).
-
-    Four-point Lagrange interpolation.
-    """
-    cells = rows.shape[0]
-    base = math.floor(position)
-    t = position - base
-    s = 1.0 - t
-    b = int(base) % cells
-    a = b - 1 if b > 0 else cells - 1
-    c = b + 1 if b + 1 < cells else 0
-    d = c + 1 if c + 1 < cells else 0
-    wa, wb = -t * s * (1.0 + s) / 6.0, (1.0 + t) * s * (1.0 + s) / 2.0
-    wc, wd = (1.0 + t) * t * (1.0 + s) / 2.0, -(1.0 + t) * t * s / 6.0
-    x = wa * rows[a, 0] + wb * rows[b, 0] + wc * rows[c, 0] + wd * rows[d, 0]
-    y = wa * rows[a, 1] + wb * rows[b, 1] + wc * rows[c, 1] + wd * rows[d, 1]
-    return float(x * sin + y * cos)
-
-
-@njit(cache=True, error_model="numpy")
-def _hermite(a: float, va: float, b: float, vb: float, h: float, u: float) -> float:
-    """Cubic through values a, b and slopes va, vb at the ends of an interval of length h, at fraction u."""
-    w = 1.0 - u
-    return a * w * w * (1.0 + 2.0 * u) + b * u * u * (3.0 - 2.0 * u) + h * u * w * (va * w - vb * u)
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,18 +105,18 @@ def _cut(
             height = 0.5 * (low + high)
             if arcs.shape[0] == 0:
                 enter, go = start + height * now[START_SLOPE], leave + height * now[EXIT_SLOPE]
-                width = (high - low) * (_past((phi - enter) / turned, length) - _past((phi - go) / turned, length))
+                width = (high - low) * (past((phi - enter) / turned, length) - past((phi - go) / turned, length))
             else:
                 width = 0.0
                 for a in range(arcs.shape[1]):
-                    width += (high - low) * (_past((phi - arcs[s, a, 0]) / turned, length)
-                                             - _past((phi - arcs[s, a, 1]) / turned, length))
+                    width += (high - low) * (past((phi - arcs[s, a, 0]) / turned, length)
+                                             - past((phi - arcs[s, a, 1]) / turned, length))
             if width <= 0.0:
                 continue
             place[j, s, 2] = height
             feed = (now[FEED_X] + now[FEED_X_SLOPE] * height) * sin + now[FEED_Y] * cos
             position = (psi + tooth_angle[j] - (s + 0.5) * lag_step) / cell
-            left = _left(surface[ahead, s], position - cells if teeth == 1 else position, sin, cos)
+            left = surface_at(surface[ahead, s], position - cells if teeth == 1 else position, sin, cos)
             h = runout[j] + px * sin + py * cos + feed * period - left
             if contact and h <= 0.0:
                 continue
@@ -235,8 +177,8 @@ def _leave_surface(
                 cos_back = 1.0 - square / 2.0 * (1.0 - square / 12.0)
                 sin = place[j, s, 0] * cos_back - place[j, s, 1] * sin_back
                 cos = place[j, s, 1] * cos_back + place[j, s, 0] * sin_back
-                x = sin * runout[j] + _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
-                y = cos * runout[j] + _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
+                x = sin * runout[j] + hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
+                y = cos * runout[j] + hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 here = int(node) % surface.shape[2]
                 if contact and place[j, s, 2] >= 0.0:
                     old = here if teeth > 1 else int(node - cells) % surface.shape[2]  # one tooth: a revolution ago
@@ -307,7 +249,7 @@ def advance(
             for c in range(around.shape[1]):
                 for e in range(2):
                     around[s, c, e] = (1.0 - u) * arcs[k, s, c, e] + u * arcs[k + 1, s, c, e]
-        now[TOOL_ANGLE] = _hermite(knots[k, TOOL_ANGLE], knots[k, TOOL_SPEED], knots[k + 1, TOOL_ANGLE],
+        now[TOOL_ANGLE] = hermite(knots[k, TOOL_ANGLE], knots[k, TOOL_SPEED], knots[k + 1, TOOL_ANGLE],
                                    knots[k + 1, TOOL_SPEED], span, u)
         turned = now[TOOL_ANGLE] - scalars[ANGLE]
         psi0 = scalars[PSI]
@@ -376,8 +318,8 @@ def advance(
             while mark * mark_angle <= now[TOOL_ANGLE]:
                 part = (mark * mark_angle - scalars[ANGLE]) / turned
                 marks[written, 0] = time - (1.0 - part) * dt
-                marks[written, 1] = _hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
-                marks[written, 2] = _hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
+                marks[written, 1] = hermite(motion[0, 0], motion[0, 2], motion[1, 0], motion[1, 2], dt, part)
+                marks[written, 2] = hermite(motion[0, 1], motion[0, 3], motion[1, 1], motion[1, 3], dt, part)
                 marks[written, 3] = scalars[CHIP]
                 scalars[CHIP] = 0.0
                 written += 1
@@ -387,30 +329,3 @@ def advance(
         scalars[PSI] = psi1
         scalars[LAST_DEPTH] = max(0.0, now[DEPTH])
     return written
-
-
-@njit(cache=True, error_model="numpy")
-def decimate(phases: Floats, taps: Floats, out: Floats) -> None:
-    """Filter with symmetric `taps` and decimate; out (channels, n) is overwritten.
-
-    phases (channels, ratio, m): samples first + p + q * ratio of a channel at [p, q]; out[:, k] is
-    centred on the sample first + k * ratio + len(taps) // 2. Every output is summed in the same order.
-    """
-    ratio = phases.shape[1]
-    out[:] = 0.0
-    for c in range(out.shape[0]):
-        row = out[c]
-        for n in range(taps.shape[0]):
-            tap = taps[n]
-            source = phases[c, n % ratio, n // ratio : n // ratio + row.shape[0]]
-            for k in range(row.shape[0]):
-                row[k] += tap * source[k]
-
-
-@njit(cache=True, error_model="numpy")
-def first_order(white: Floats, pole: float, last: float, out: Floats) -> float:
-    """First-order autoregressive noise out[n] = pole out[n-1] + white[n]; returns the last value."""
-    for n in range(white.shape[0]):
-        last = pole * last + white[n]
-        out[n] = last
-    return last
