@@ -75,6 +75,9 @@ KINDS = {kind.name: kind for kind in (
              (CHATTER_STATE, *VERDICT_PLOTS), "judges the sensor signal: air, stable, chatter"),
     NodeKind("planner", "consumer", (OPERATION, STABILITY_MARGIN, CHATTER_STATE), (PLAN_SUGGESTION,),
              "suggests a more productive or a stable cut when asked, in a process of its own"),
+    NodeKind("dashboard", "server", (
+        OPERATION, SENSOR_BLOCKS, CHATTER_STATE, STABILITY_MARGIN, CUTTING_LOADS, PLAN_SUGGESTION), (),
+             "shows the running graph as a page in a browser; in a process of its own"),
     NodeKind("recorder", "recorder", (*INPUTS, *(t for t in OUTPUTS if t is not DIAGNOSTICS)), (),
              "records every topic of the table"),
 )}

@@ -50,12 +50,17 @@ def conflict_text(found: Conflict) -> str:
     return joint + where + ", ".join(parts)
 
 
+def cut_text(tool_speed: float, workpiece_speed: float, depth: float) -> str:
+    """A cut in short; speeds [rad/s], depth [m]."""
+    turning = f", workpiece {abs(workpiece_speed) * RPM:.4g} rpm" if workpiece_speed else ""
+    return f"tool {tool_speed * RPM:.0f} rpm{turning}, {depth * 1e3:.4g} mm"
+
+
 def observation_text(seen: Observation) -> str:
     """One observation: "measured: chatter at 775.4 Hz (tool 3025 rpm, workpiece 6 rpm, 4 mm)"."""
     heard = f" at {seen.frequency:.1f} Hz" if math.isfinite(seen.frequency) else ""
-    turning = f", workpiece {abs(seen.workpiece_speed) * RPM:.4g} rpm" if seen.workpiece_speed else ""
-    return (f"measured: {'chatter' + heard if seen.chatter else 'no chatter'} (tool {seen.tool_speed * RPM:.0f} rpm"
-            f"{turning}, {seen.depth * 1e3:.4g} mm)")
+    cut = cut_text(seen.tool_speed, seen.workpiece_speed, seen.depth)
+    return f"measured: {'chatter' + heard if seen.chatter else 'no chatter'} ({cut})"
 
 
 def suggestion_reasons(found: Suggestion, observations: Sequence[Observation]) -> list[str]:

@@ -132,23 +132,27 @@ def live(
     sample_rate: Annotated[str, typer.Option(help="Sample rate of the sensors.")] = "51.2 kHz",
     channels: Annotated[int, typer.Option(help="Number of sensor channels.")] = 5,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
+    dashboard: Annotated[int | None, typer.Option(
+        metavar="PORT", help="Show it meanwhile at http://127.0.0.1:PORT/.")] = None,
     changes: SetOption = None, as_json: JsonFlag = False,
 ) -> None:
     """Run the twin next to a simulated controller; record and judge as it happens. Ctrl-C ends it cleanly.
 
-    Example: turnmill live demo_turn_milling --duration 20s -o twin.mcap
+    Example: turnmill live demo_turn_milling --duration 20s -o twin.mcap --dashboard 8080
     """
     import tempfile
 
     _need_ros()
     from turnmill_ros.analysis import analysis_of
+    from turnmill_ros.dashboard import running
     from turnmill_ros.operations import find_operation
     from turnmill_ros.replay import run_live
 
     operation = find_operation(op_name, changes or ())
     if output is not None:
         new_file(output)
-    with tempfile.TemporaryDirectory(prefix="turnmill-") as folder:
+    port = None if dashboard is None else whole(dashboard, "--dashboard", 1, 65535)
+    with tempfile.TemporaryDirectory(prefix="turnmill-") as folder, running(port):
         out = output or Path(folder) / "live.mcap"
         result = run_live(
             operation,
