@@ -10,9 +10,10 @@ import pytest
 
 from turnmill_core.cutting.engagement import engagement
 from turnmill_core.cutting.engagement_map import EngagementMap, engage, engagement_along, engagement_map
-from turnmill_core.cutting.steady import lowest_point, steady_map
+from turnmill_core.cutting.steady import steady_map
 from turnmill_core.cutting.swept import fresh_workpiece
 from turnmill_core.machine.axes import AxisState
+from turnmill_core.machine.conditions import lowest_point
 from turnmill_core.operation import Operation, Shape, Tool, Workpiece
 
 from .cases import AL6061, MM, milling, table_31, table_32, turn_milling

@@ -178,12 +178,9 @@ def test_the_force_predictor_follows_the_workpiece_in_process(probe: Probe) -> N
     probe.announce(topics.JOINT_STATES)
     predictor = probe.add(ForcePredictor, match=["joint_states=1", "cutting_loads=1"])
     assert support.start(predictor)
-    states = []
-    for k in range(12):
-        axes = axis_state_at(op, k * 0.02, 10**12 + k * 20_000_000)
-        x, y, z, b, c, s = axes.position
-        states.append(replace(axes, position=(x, y, z, b + op.tilt, c, s)))
-        probe.publish(topics.JOINT_STATES, axes_to_message(states[-1], ros_types()))
+    states = [axis_state_at(op, k * 0.02, 10**12 + k * 20_000_000) for k in range(12)]
+    for axes in states:
+        probe.publish(topics.JOINT_STATES, axes_to_message(axes, ros_types()))
     heard = probe.heard["cutting_loads"]
     assert probe.until(lambda: len(heard) == 12)
     expected = loads_along(op, states)

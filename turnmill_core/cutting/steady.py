@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnmill_core.cutting.cutter import outer_radius
 from turnmill_core.cutting.engagement_map import EngagementMap, engagement_map
 from turnmill_core.cutting.feed import cross_feed_sense
 from turnmill_core.cutting.swept import Stock, fresh_workpiece, stock_of, swept_by
 from turnmill_core.cutting.tool import Array, read_only
 from turnmill_core.machine.axes import AxisState
-from turnmill_core.operation import Conditions, Operation, Tool, require
+from turnmill_core.machine.conditions import tip_position
+from turnmill_core.operation import Conditions, Operation, require
 
-_TURNS = 1.5
-"""Workpiece revolutions that are swept before; passes before the last one reach nothing that it has not."""
+_MOST_TURNS = 30.5
+"""Workpiece revolutions that are swept before at most."""
 
 
 def steady_map(op: Operation, conditions: Conditions, elements: int = 48, bottom: int = 16) -> EngagementMap:
@@ -52,18 +52,11 @@ def steady_axes(op: Operation, conditions: Conditions) -> AxisState:
         return AxisState(0, (x0, y0, z0 - conditions.depth, 0.0, 0.0, 0.0),
                          (conditions.feed_speed, 0.0, 0.0, 0.0, 0.0, conditions.tool_speed))
     sense = math.copysign(1.0, conditions.workpiece_speed or op.conditions.workpiece_speed)
-    x = op.workpiece.radius - conditions.depth - lowest_point(op.tool, op.tilt)
+    x, y, b = tip_position(op, conditions.depth)
     return AxisState(
-        0, (x0 + x, y0 + op.eccentricity, z0, math.pi / 2 + op.tilt, 0.0, 0.0),
+        0, (x, y, z0, b, 0.0, 0.0),
         (0.0, 0.0, -sense * cross_feed_sense(conditions) * conditions.feed_speed, 0.0, conditions.workpiece_speed,
          conditions.tool_speed))
-
-
-def lowest_point(tool: Tool, tilt: float) -> float:
-    """Place [m] of the lowest point of a tool tilted by `tilt` [rad] off the vertical, above its tip (<= 0)."""
-    top = min(tool.flute_length, 2 * tool.diameter)
-    height = np.concatenate([[0.0], top * np.linspace(0.0, 1.0, 2001)[1:] ** 2])
-    return float(min(0.0, (height * math.cos(tilt) - outer_radius(tool, height) * abs(math.sin(tilt))).min()))
 
 
 def _start(op: Operation, conditions: Conditions, axes: AxisState) -> AxisState:
@@ -73,7 +66,12 @@ def _start(op: Operation, conditions: Conditions, axes: AxisState) -> AxisState:
         return replace(axes, position=(x - 1.5 * op.tool.diameter, y, z, b, c, s))
     if conditions.workpiece_speed == 0:
         return axes
-    time = _TURNS * 2 * math.pi / abs(conditions.workpiece_speed)
+    # passes before the last one reach nothing that it has not, unless the tool is hollow: then its rim counts all across
+    turns = 1.5
+    if op.tool.shape.bottom_clearance > 0 and conditions.feed_speed > 0:
+        feed = 2 * math.pi * conditions.feed_speed / abs(conditions.workpiece_speed)
+        turns = min(_MOST_TURNS, math.ceil(op.tool.diameter / feed) + 0.5)
+    time = turns * 2 * math.pi / abs(conditions.workpiece_speed)
     return replace(axes, position=(x, y, z - speed[2] * time, b, c - speed[4] * time, s))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turnmill_core.machine.axes import AxisState
-from turnmill_core.operation import Conditions, Operation, require
+from turnmill_core.operation import Conditions, Operation, Tool, outline, require
 
 B_TOLERANCE = math.radians(0.1)
 """Tilt of the B axis [rad] up to which a tool counts as radial to the bar (or upright over the block), and
@@ -94,18 +94,39 @@ def with_cut(
     return Conditions(tool_speed, workpiece_speed, depth, feed_speed, (lower, upper), radius)
 
 
+def lowest_point(tool: Tool, tilt: float) -> float:
+    """Place [m] (<= 0) of the lowest point of a tool tilted by `tilt` [rad] out of the vertical, above its tip."""
+    line, sine, cosine = outline(tool.diameter, tool.flute_length, tool.shape), abs(math.sin(tilt)), math.cos(tilt)
+    points = [(0.0, 0.0), line.tip_end, line.corner_end, line.top]
+    radius, (e, f) = tool.shape.corner_radius, line.centre
+    first, last = (math.atan2(r - e, f - z) for r, z in (line.tip_end, line.corner_end))
+    if radius and first <= abs(tilt) <= last:
+        points.append((e + radius * sine, f - radius * cosine))
+    return min(z * cosine - r * sine for r, z in points if math.isfinite(z))
+
+
+def tip_position(op: Operation, depth: float) -> tuple[float, float, float]:
+    """Machine coordinates x, y [m] of the tool tip and the B angle [rad] at a depth [m] in turn-milling.
+
+    The depth is what the tool's lowest point lies below the bar's radius, along x_M.
+    """
+    x = op.workpiece.radius - depth - lowest_point(op.tool, op.tilt)
+    return op.workpiece.datum[0] + x, op.workpiece.datum[1] + op.eccentricity, math.pi / 2 + op.tilt
+
+
 def start_position(op: Operation) -> tuple[float, float]:
     """Machine position (along the feed axis, y) [m] where a nominal cut begins.
 
     Bar (z, y): the leading edge is one feed per revolution inside the bar, so that the tool is in full
-    cut and length - axial_feed of travel lie ahead; y on the C axis. Block (x, y): the tool axis is above
+    cut and length - axial_feed of travel lie ahead; y at the eccentricity. Block (x, y): the tool axis is above
     the edge x = 0, so that the whole engagement is in the block and length - radius lie ahead; y puts
     the nominal immersion on its side.
     """
     datum, R, piece = op.workpiece.datum, op.tool.radius, op.workpiece
     if op.process == "turn-milling":
         inside = R - op.axial_feed
-        return (datum[2] + inside if feed_direction(op) < 0 else datum[2] - piece.length - inside), datum[1]
+        along = datum[2] + inside if feed_direction(op) < 0 else datum[2] - piece.length - inside
+        return along, datum[1] + op.eccentricity
     lower, upper = op.conditions.cross_feed_span
     if op.milling_sense == "up":
         return datum[0], datum[1] - lower
@@ -122,10 +143,10 @@ def nominal_axes(op: Operation, conditions: Conditions | None = None, stamp_ns: 
     cut = op.conditions if conditions is None else conditions
     datum, along, y = op.workpiece.datum, *start_position(op)
     if op.process == "turn-milling":
-        x = datum[0] + op.workpiece.radius - cut.depth
+        x, _, b = tip_position(op, cut.depth)
         return AxisState(
             stamp_ns,
-            (x, y, along, math.pi / 2, 0.0, 0.0),
+            (x, y, along, b, 0.0, 0.0),
             (0.0, 0.0, feed_direction(op) * cut.feed_speed, 0.0, cut.workpiece_speed, cut.tool_speed),
         )
     return AxisState(
@@ -156,6 +177,7 @@ def conditions_from_axes(op: Operation, axes: AxisState) -> Conditions:
 def _bar(op: Operation, axes: AxisState, tool_speed: float) -> Conditions:
     bar, R = op.workpiece, op.tool.radius
     x, y, z = (p - d for p, d in zip(axes.position[:3], bar.datum, strict=True))
+    x, y = x + lowest_point(op.tool, op.tilt), y - op.eccentricity
     feed, workpiece_speed = axes.velocity[2], axes.velocity[4]
     depth = bar.radius - x
     if abs(feed) < STANDING_FEED:
@@ -178,11 +200,11 @@ def _bar(op: Operation, axes: AxisState, tool_speed: float) -> Conditions:
 
 def _check_bar(op: Operation, axes: AxisState, y: float, depth: float, axial_feed: float) -> None:
     R, bar, tool = op.tool.radius, op.workpiece, op.tool
-    tilt = axes.position[3]
-    require(abs(tilt - math.pi / 2) <= B_TOLERANCE, "tool head angle (axis b)", tilt, "rad",
-            "pi/2 within 0.1 deg: only orthogonal turn-milling is described")
-    require(abs(y) <= 1e-3 * tool.diameter, "tool offset from the workpiece axis (axis y)", y, "m",
-            "0 within a thousandth of the tool diameter: eccentric turn-milling is not described")
+    b, expected = axes.position[3], "pi/2" if op.tilt == 0 else f"{math.pi / 2 + op.tilt:.6g}"
+    require(abs(b - math.pi / 2 - op.tilt) <= B_TOLERANCE, "tool head angle (axis b)", b, "rad",
+            f"{expected} within 0.1 deg: only the operation's turn-milling is described")
+    require(abs(y) <= 1e-3 * tool.diameter, "tool offset from the workpiece axis (axis y)", y + op.eccentricity, "m",
+            f"{op.eccentricity:g} within a thousandth of the tool diameter: another eccentricity is not described")
     require(depth < bar.radius, "depth", depth, "m", f"less than the bar's radius {bar.radius} m")
     require(depth <= tool.flute_length * (1 + _REL), "depth", depth, "m",
             f"at most the flute length {tool.flute_length} m")

@@ -11,7 +11,7 @@ import math
 from itertools import pairwise
 
 from turnmill_core.machine.axes import AxisState
-from turnmill_core.machine.conditions import feed_direction, start_position
+from turnmill_core.machine.conditions import feed_direction, start_position, tip_position
 from turnmill_core.operation import Operation, SchedulePoint, require
 
 DEFAULT_DURATION = 10.0
@@ -36,10 +36,10 @@ def axis_state_at(op: Operation, t_s: float, stamp_ns: int) -> AxisState:
     datum, along, y = op.workpiece.datum, *start_position(op)
     if op.process == "turn-milling":
         per_radian = feed_direction(op) * op.axial_feed / (2 * math.pi)
-        x = datum[0] + op.workpiece.radius - depth
+        x, y, b = tip_position(op, depth)
         return AxisState(
             stamp_ns,
-            (x, y, along + per_radian * workpiece_turned, math.pi / 2, workpiece_angle, tool_angle),
+            (x, y, along + per_radian * workpiece_turned, b, workpiece_angle, tool_angle),
             (-plunge, 0.0, per_radian * abs(workpiece_speed), 0.0, workpiece_speed, tool_speed),
         )
     per_radian = op.feed_per_tooth * op.tool.teeth / (2 * math.pi)

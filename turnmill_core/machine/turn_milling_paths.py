@@ -66,18 +66,21 @@ class TurnMillingCut:
 
 
 def cut_from_operation(
-    op: Operation, eccentricity: float = 0.0, workpiece_speed: float | None = None
+    op: Operation, eccentricity: float | None = None, workpiece_speed: float | None = None
 ) -> TurnMillingCut:
     """The nominal cut of a turn-milling operation, in the direction that gives its milling sense.
 
-    eccentricity [m]; workpiece_speed [rad/s]: another one than the operation's; turned the other way, the tool goes on
-    in the same direction and the milling sense changes. Raises ValueError for another process, or values it forbids.
+    eccentricity [m], workpiece_speed [rad/s]: others than the operation's; turned the other way, the tool goes on
+    in the same direction and the milling sense changes. Raises ValueError for another process or a tilted tool, or for
+    values that a cut forbids.
     """
     require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
+    require(op.tilt == 0, "tilt", op.tilt, "rad", "0: generated paths have B at 90 deg, or across a contour")
     cut = op.conditions
     return TurnMillingCut(
         op.workpiece.radius, op.workpiece.length, op.tool.radius, cut.depth, op.axial_feed, cut.tool_speed,
-        cut.workpiece_speed if workpiece_speed is None else workpiece_speed, feed_direction(op), eccentricity,
+        cut.workpiece_speed if workpiece_speed is None else workpiece_speed, feed_direction(op),
+        op.eccentricity if eccentricity is None else eccentricity,
         flute_length=op.tool.flute_length)
 
 

@@ -39,7 +39,8 @@ def toolpath(
     changes: SetOption = None,
     workpiece_speed: Annotated[str | None, typer.Option(
         metavar="QUANTITY", help="Speed of the turning workpiece, e.g. -6rpm; the sign is the sense about +z.")] = None,
-    eccentricity: Annotated[str, typer.Option(metavar="QUANTITY", help="Offset of the tool axis along y.")] = "0mm",
+    eccentricity: Annotated[str | None, typer.Option(
+        metavar="QUANTITY", help="Offset of the tool axis along y [default: that of the operation].")] = None,
     sagitta: Annotated[str | None, typer.Option(
         metavar="QUANTITY", help="Bow of the curved contour [default: a quarter of its radius].")] = None,
     machine: Annotated[Path | None, typer.Option(metavar="YAML", help="Machine description.")] = None,
@@ -94,7 +95,8 @@ def toolpath(
 
 def _asked(
     file: Path | None, generate: Kind | None, operation: str | None, changes: list[str] | None,
-    workpiece_speed: str | None, eccentricity: str, sagitta: str | None, machine_file: Path | None, tool_length: str,
+    workpiece_speed: str | None, eccentricity: str | None, sagitta: str | None, machine_file: Path | None,
+    tool_length: str,
 ) -> tuple[AptFile, MachineKinematics, AxisLimits]:
     """The path with what was not understood, and the machine with its strokes."""
     from turnmill_core.machine.apt import AptFile, read_apt
@@ -109,7 +111,7 @@ def _asked(
     machine, limits = (NT3150, NT3150_LIMITS) if machine_file is None else read_machine(machine_file)
     speed = quantity(workpiece_speed, "rad/s", "--workpiece-speed")
     if file is not None:
-        if operation is not None or changes or sagitta is not None or eccentricity != "0mm":
+        if operation is not None or changes or sagitta is not None or eccentricity is not None:
             raise InputError("toolpath: --operation, --set, --eccentricity and --sagitta go with --generate")
         found = read_apt(file.read_text(encoding="utf-8", errors="replace"), str(file))
         if speed is not None:
@@ -125,12 +127,12 @@ def _asked(
     return found, with_tool_length(machine, length) if length else machine, limits
 
 
-def _generated(kind: Kind, op: Any, speed: float | None, eccentricity: str, sagitta: str | None) -> Toolpath:
+def _generated(kind: Kind, op: Any, speed: float | None, eccentricity: str | None, sagitta: str | None) -> Toolpath:
     from turnmill_core.machine import turn_milling_paths as make
 
     if sagitta is not None and kind != "curved":
         raise InputError("toolpath: --sagitta goes with --generate curved")
-    cut = make.cut_from_operation(op, quantity(eccentricity, "m", "--eccentricity") or 0.0, speed)
+    cut = make.cut_from_operation(op, quantity(eccentricity, "m", "--eccentricity"), speed)
     if kind == "curved":
         bow = quantity(sagitta, "m", "--sagitta")
         return make.curved_path(cut, make.arc_profile(cut, cut.finished_radius / 4 if bow is None else bow))
