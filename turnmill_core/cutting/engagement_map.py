@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turnmill_core.cutting._kernels import sweep
 from turnmill_core.cutting.cutter import cutter_elements, outer_radius
@@ -27,6 +28,7 @@ PROBE_STEP = math.radians(2)
 
 _TOLERANCE = 1e-6  # rad, of an arc's ends
 _LEVELS = 60  # heights at which contact is sought
+_OFF = 2e-6  # m, more than the straight way between two poses is off the path
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,16 @@ def engagement_map(
     low, top, beyond = contact
     edges = cutter_elements(op.tool, top, elements, bottom if low == 0 else 0, low)
     feed = normal_feed(motion, edges)
-    poses = _earlier(op.tool, workpiece, now, columns, edges)
-    start, stop = _arcs(workpiece, poses, now[:3], columns, edges.radius, edges.height, feed)
+    earlier, last = _passed(op.tool, workpiece, now, columns, edges)
+    start, stop = _arcs(workpiece, earlier, now[:3], columns, edges.radius, edges.height, feed)
+    if op.tool.shape.bottom_clearance > 0 and edges.bottom.any():
+        # A hollow meets what its rim has left: nothing where the tool was before, felt a little inside the surface, nor
+        # where the rim has just been, felt a little outside of it.
+        hollow, part = edges.chosen(edges.bottom), feed[edges.bottom]
+        within, without = (_arcs(workpiece, poses, now[:3], columns, hollow.radius, hollow.height + off, part)
+                           for poses, off in ((earlier, _OFF), (last, -_OFF)))
+        common = _common(within, without)
+        start, stop = (_replaced(arcs, some, edges.bottom) for arcs, some in zip((start, stop), common, strict=True))
     if beyond > top:
         _check_shank(op.tool, workpiece, motion, now, columns, beyond)
     arcs = Engagement(edges.height, read_only(start), read_only(stop))
@@ -149,22 +159,46 @@ def _levels(
     return hits > 0
 
 
-def _earlier(tool: Tool, workpiece: SweptWorkpiece, now: Array, columns: Array, edges: EdgeElements) -> Array:
-    """Poses that may have swept what the edges meet, but for the last ones, less than two spacings away.
+def _common(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Where both of two sets of arcs (m, A), (m, B) are; (m, A B), empty arcs last."""
+    low = np.maximum(first[0][:, :, None], second[0][:, None, :]).reshape(len(first[0]), -1)
+    high = np.minimum(first[1][:, :, None], second[1][:, None, :]).reshape(low.shape)
+    order = np.argsort(np.where(high > low, low, np.inf), axis=1)
+    low, high = (np.take_along_axis(a, order, 1) for a in (low, high))
+    end = np.maximum.accumulate(np.where(high > low, high, -np.inf), axis=1)
+    end = np.where(np.isneginf(end), 0.0, end)
+    return np.where(high > low, low, end), end
+
+
+def _replaced(arcs: Array, some: Array, rows: NDArray[np.bool_]) -> Array:
+    """Arcs (m, A) with other ones in the chosen rows; as many columns as either has, filled with the last."""
+    width = max(arcs.shape[1], some.shape[1])
+    result, some = (np.pad(a, ((0, 0), (0, width - a.shape[1])), mode="edge") for a in (arcs, some))
+    result[rows] = some
+    return np.asarray(result, dtype=np.float64)
+
+
+def _passed(
+    tool: Tool, workpiece: SweptWorkpiece, now: Array, columns: Array, edges: EdgeElements
+) -> tuple[Array, Array]:
+    """Poses that may have swept what the edges meet; and apart the last ones, less than two spacings away.
 
     A convex tool leaves those behind: its leading side was never in them, nor on the way from them.
     """
-    newest = workpiece.poses
+    earlier = workpiece.poses
     for block in workpiece.blocks[::-1]:
         moved = (np.linalg.norm(block[:3] - now[:3, None], axis=0)
                  + 2 * tool.diameter * np.linalg.norm(block[3:6] - now[3:, None], axis=0))
-        away = np.flatnonzero(moved[::-1] >= 2 * workpiece.spacing)
-        newest -= int(away[0]) if away.size else block.shape[1]
-        if away.size:
+        apart = np.flatnonzero(moved[::-1] >= 2 * workpiece.spacing)
+        earlier -= int(apart[0]) if apart.size else block.shape[1]
+        if apart.size:
             break
     low, top = float(edges.height.min()), float(edges.height.max())
     size = math.hypot((top - low) / 2, float(edges.radius.max()))
-    return poses_near(workpiece, now[:3] + columns[:, 2] * (low + top) / 2, size, newest)
+    near = poses_near(workpiece, now[:3] + columns[:, 2] * (low + top) / 2, size, earlier)
+    last = np.concatenate([np.empty((12, 0)), *workpiece.blocks], axis=1)[:, earlier:] if (
+        tool.shape.bottom_clearance > 0) else np.empty((12, 0))
+    return near, np.ascontiguousarray(last)
 
 
 def _arcs(
