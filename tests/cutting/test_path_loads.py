@@ -158,7 +158,7 @@ def test_signs_of_a_known_cut() -> None:
     assert pushed.force_machine_mean[0] > 0
     assert abs(pushed.force_tool_mean[1]) < 0.1 * pushed.force_tool_mean[2]
     along, across = math.sqrt(2 * R * 2 * MM - (2 * MM) ** 2), math.sqrt(2 * 2 * MM / (1 / R + 1 / BAR))
-    assert cut.removal.total == pytest.approx(1e-3 * math.pi * along * across, rel=0.05)  # the contact is nearly an ellipse
+    assert cut.removal.total == pytest.approx(1e-3 * math.pi * along * across, rel=0.05)  # nearly an ellipse
 
 
 def test_bottom_edges_lift_the_tool_and_carry_their_share() -> None:
@@ -179,7 +179,7 @@ def test_clearance_leaves_the_bottom_to_the_wiper() -> None:
     for clearance, wiper in ((0.2, 2.0), (6.0, 2.0), (0.2, 0.5), (6.0, 0.5)):
         op = operation(Shape(bottom_clearance=math.radians(clearance), wiper_length=wiper * MM))
         cut = steady_map(op, op.conditions, 64, 120)
-        assert cut.removal.total == pytest.approx(base.total, rel=3e-3)
+        assert cut.removal.total == pytest.approx(base.total, rel=1e-3 if wiper == 2.0 else 0.03)
         if wiper == 2.0:
             assert cut.removal.bottom == pytest.approx(base.bottom, rel=1e-3)
             assert not cut.arcs.angle[cut.elements.bottom & (cut.elements.radius < 5.9 * MM)].any()
@@ -217,7 +217,8 @@ def test_no_contact_or_a_tool_at_rest_is_no_load_and_no_error() -> None:
                        replace(op.conditions, workpiece_speed=0.0, feed_speed=0.0)):
         loads = cutting_loads(op, conditions)
         assert not loads.in_cut
-        assert not loads.force_tool.any() and loads.material_removal_rate == 0
+        assert not loads.force_tool.any()
+        assert loads.material_removal_rate == 0
     workpiece, end = steady(op, BAR + 1 * MM)
     assert not path_loads(op, engagement_map(op, workpiece, end)).in_cut
     still = replace(state(op, BAR - DEPTH), velocity=(0.0,) * 6)
@@ -225,8 +226,8 @@ def test_no_contact_or_a_tool_at_rest_is_no_load_and_no_error() -> None:
 
 
 def test_a_depth_beyond_the_flutes_is_refused() -> None:
-    op = turn_milling(Tool("t", 16 * MM, 2, flute_length=9 * MM, shape=SHAPES["ball"]), AL6061, 60 * MM, 8.9 * MM, 2 * MM,
-                      3000, 10)
+    short = Tool("t", 16 * MM, 2, flute_length=9 * MM, shape=SHAPES["ball"])
+    op = turn_milling(short, AL6061, 60 * MM, 8.9 * MM, 2 * MM, 3000, 10)
     with pytest.raises(ValueError, match=r"depth is 0\.01 m, expected in .* the flute length"):
         cutting_loads(op, replace(op.conditions, depth=10 * MM, effective_radius=20 * MM))
 
@@ -237,5 +238,6 @@ def test_maps_are_made_at_every_state_of_a_path() -> None:
     cuts = list(engagement_along(op, states))
     assert len(cuts) == 25
     rates = np.array([c.removal.total for c in cuts])
-    assert rates[0] == 0 and np.all(np.diff(rates[rates > 0][:5]) > 0)  # it comes into the bar from its end
+    assert rates[0] == 0
+    assert np.all(np.diff(rates[rates > 0][:5]) > 0)  # it comes into the bar from its end
     assert [c.motion.stamp_ns for c in cuts] == [s.stamp_ns for s in states]

@@ -66,7 +66,7 @@ def _start(op: Operation, conditions: Conditions, axes: AxisState) -> AxisState:
         return replace(axes, position=(x - 1.5 * op.tool.diameter, y, z, b, c, s))
     if conditions.workpiece_speed == 0:
         return axes
-    # passes before the last one reach nothing that it has not, unless the tool is hollow: then its rim counts all across
+    # passes before the last one reach nothing that it has not, unless the tool is hollow: then its rim counts
     turns = 1.5
     if op.tool.shape.bottom_clearance > 0 and conditions.feed_speed > 0:
         feed = 2 * math.pi * conditions.feed_speed / abs(conditions.workpiece_speed)
