@@ -33,6 +33,7 @@ PER_FACET = 6
 ROWS = 200
 BINS = 400
 ACROSS = 1200
+CHOSEN = 3_000_000
 LARGEST = 20_000_000
 CHUNK = 500
 
@@ -78,7 +79,8 @@ def surface_map(
 ) -> SurfaceMap:
     """Finished surface over `around` [rad] of the workpiece and `passes` axial feeds.
 
-    around: None for a full workpiece revolution. columns, rows: cells (columns None: six to every tooth pass).
+    around: None for a full workpiece revolution. columns, rows: cells (columns None: six to every tooth pass,
+    where that is not more than three million cells).
     vibration: tool angle [rad] (p,), equally spaced over a revolution from 0, and displacement of the tool against
     the workpiece along +z_T [m] (p,); None: the steady vibration of the linear cut.
     progress: called with the share that is done. Raises ``ValueError`` for milling, a tilted tool, no contact, or more
@@ -93,7 +95,8 @@ def surface_map(
     require(0 < span <= TWO_PI * (1 + 1e-12), "angle around", span, "rad", "in (0, 2 pi]")
     require(passes > 0, "passes", passes, "", "a number > 0")
     facet = speed * TWO_PI / (op.tool.teeth * conditions.tool_speed)
-    n = max(16, math.ceil(PER_FACET * span / facet)) if columns is None else columns
+    fine = min(max(16, math.ceil(PER_FACET * span / facet)), max(16, CHOSEN // max(rows, 1)))
+    n = fine if columns is None else columns
     require(n >= 2 and rows >= 2, "cells", (n, rows), "", "at least 2 each way")
     require(n * rows <= LARGEST, "cells", n * rows, "", f"at most {LARGEST}; ask for fewer columns or rows")
     feed = conditions.feed_speed * TWO_PI / speed

@@ -35,7 +35,7 @@ def surface(
         metavar="QUANTITY", help="Part of the workpiece revolution, e.g. 2deg [default: all of it].")] = None,
     passes: Annotated[float, typer.Option(metavar="N", help="Axial feeds that the map covers.")] = 1.0,
     columns: Annotated[int | None, typer.Option(
-        metavar="N", help="Points around [default: six to every tooth pass].")] = None,
+        metavar="N", help="Points around [default: six to every tooth pass, at most three million in all].")] = None,
     rows: Annotated[int, typer.Option(metavar="N", help="Points along the bar.")] = 200,
     cutoff: Annotated[str, typer.Option(
         metavar="QUANTITY", help="Cut-off wavelength of the roughness profiles.")] = "0.8mm",
