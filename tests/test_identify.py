@@ -130,3 +130,13 @@ def test_one_feed_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (code, out) == (2, "")
     assert "different feeds" in err
     assert not (tmp_path / "new.yaml").exists()
+
+
+def test_the_alloys_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = ask(capsys, "operation", "--alloys")
+    assert code == 0
+    assert "Budak" in out
+    assert "0.005 to 0.2" in out
+    found = json.loads(ask(capsys, "operation", "--alloys", "--json")[1])
+    assert [alloy["name"] for alloy in found] == ["Ti6Al4V", "Al7050-T7451"]
+    assert found[0]["Kte_n_m"] == 24e3
