@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from turnmill_core.operation_structure import BeamMaterial, Chuck, Support
 from turnmill_core.structure.beam import (
+    damped_modes,
     free_bar,
     normal_modes,
     on_chuck,
@@ -147,3 +148,23 @@ def test_a_stepped_bar_of_one_diameter_is_the_plain_one() -> None:
     plain = cylinder(0.4, 0.06)
     found = [normal_modes(free_bar(bar, STEEL), 5).frequency for bar in (plain, plain.split([0.12, 0.3]))]
     np.testing.assert_allclose(*found, rtol=1e-8, atol=0.1)
+
+
+def test_damped_modes_are_the_poles_of_the_elements() -> None:
+    """Frequency and damping against the eigenvalues of the whole first-order system, with a strong damper at one place."""
+    held = with_supports(free_bar(cylinder(0.4, 0.04), STEEL), (Support(0.4, 4e8, 0.0), Support(0.25, 2e7, 900.0)))
+    n = held.M.shape[0]
+    inverse = np.linalg.inv(held.M)
+    poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ held.K, -inverse @ held.C]]))
+    poles = sorted(poles[poles.imag > 0], key=abs)[:3]
+    found = damped_modes(held, 3)
+    np.testing.assert_allclose(found.frequency, np.abs(poles) / (2 * np.pi), rtol=1e-4)
+    np.testing.assert_allclose(found.damping, -np.real(poles) / np.abs(poles), rtol=1e-2)
+
+
+def test_damped_modes_of_proportional_damping_are_the_normal_ones() -> None:
+    lossy = on_chuck(free_bar(cylinder(0.5, 0.1), BeamMaterial(200e9, 7860.0, 0.29, 0.002)), Chuck())
+    normal, damped = normal_modes(lossy, 3), damped_modes(lossy, 3)
+    np.testing.assert_allclose(damped.frequency, normal.frequency, rtol=1e-5)
+    np.testing.assert_allclose(damped.damping, normal.damping, rtol=1e-5)
+    np.testing.assert_allclose(np.abs(damped.shapes), np.abs(normal.shapes), rtol=1e-4, atol=1e-6)

@@ -209,3 +209,34 @@ def normal_modes(model: PlaneModel, count: int) -> PlaneModes:
     taken = np.einsum("im,ij,jm->m", shapes, model.C, shapes) / safe
     taken = taken + np.einsum("im,ij,jm->m", shapes, model.lossy, shapes) / safe**2
     return PlaneModes(w / (2 * np.pi), taken / 2, shapes)
+
+
+@dataclass(frozen=True, eq=False)
+class DampedModes:
+    """Complex modes in one plane, in the order of their frequencies.
+
+    frequency (m,) [Hz]: |lambda| / 2 pi; damping (m,) [1]; shapes (n, m) complex, such that the receptance between the
+    degrees of freedom i and j is the sum of p_i p_j / (2 i w_d (s - lambda)) and its conjugate.
+    """
+
+    frequency: Floats
+    damping: Floats
+    shapes: Complexes
+
+
+def damped_modes(model: PlaneModel, count: int) -> DampedModes:
+    """The lowest `count` vibrating modes with the damping as it is, proportional or not.
+
+    Solved among the lowest normal modes; hysteretic damping is taken as viscous at the frequencies of these.
+    """
+    own = normal_modes(model, min(model.M.shape[0], max(4 * count, 12)))
+    w, P = 2 * np.pi * own.frequency, own.shapes
+    size = w.size
+    root = np.sqrt(np.maximum(w, 1e-6 * w.max()))
+    C = P.T @ model.C @ P + (P.T @ model.lossy @ P) / np.outer(root, root)
+    poles, vectors = np.linalg.eig(np.block([[np.zeros((size, size)), np.eye(size)], [-np.diag(w**2), -C]]))
+    order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 0.1 * abs(poles[k])][:count]
+    pole, v = poles[order], vectors[:size, order]
+    scale = np.einsum("im,im->m", v, v) * 2 * pole + np.einsum("im,ij,jm->m", v, C, v)
+    shapes = P @ (v * np.sqrt(2j * pole.imag / scale))
+    return DampedModes(np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole), shapes)

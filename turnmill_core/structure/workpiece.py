@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from turnmill_core.operation import Conditions, Mode, Operation, Structure, Workpiece, require
 from turnmill_core.operation_structure import Beam
-from turnmill_core.structure.beam import PlaneModel, free_bar, normal_modes, on_chuck, with_supports
-from turnmill_core.structure.modal import Floats
+from turnmill_core.structure.beam import DampedModes, PlaneModel, damped_modes, free_bar, on_chuck, with_supports
+from turnmill_core.structure.complex_modes import CANCELLATION, power_fault, velocity_left
+from turnmill_core.structure.modal import Complexes, Floats, ModalModel
 from turnmill_core.structure.profile import BarProfile, stock_profile
 
 PLACES = 2000
@@ -28,24 +29,34 @@ def plane_models(profile: BarProfile, beam: Beam, ends_at: ArrayLike = ()) -> tu
 def bar_structure(profile: BarProfile, beam: Beam, contact: float) -> Structure:
     """Modes of the bar at the distance `contact` [m] from its free end, machine frame.
 
-    The modal mass is that of the mode's largest displacement along the bar, the shape its part at the contact.
-    Raises ``ValueError`` for a mode without damping: then the material has no loss factor and the chuck no damper.
+    The modal mass is that of the mode's largest displacement along the bar, the shape its part at the contact. Damping
+    that is not proportional gives modes with a phase. Raises ``ValueError`` for a mode without damping: then the
+    material has no loss factor and the chuck no damper.
     """
     modes: list[Mode] = []
-    x, y = plane_models(profile, beam)
-    for axis, plane in enumerate((x, y)):
-        found = normal_modes(plane, beam.modes)
-        lateral = plane.reach[::2] @ found.shapes
-        at_contact = plane.row(contact) @ found.shapes
-        for k, (frequency, damping) in enumerate(zip(found.frequency, found.damping, strict=True)):
-            require(damping > 0, "workpiece damping", float(damping), f"at {frequency:.0f} Hz",
+    for axis, plane in enumerate(plane_models(profile, beam)):
+        found = damped_modes(plane, beam.modes)
+        for frequency, damping in zip(found.frequency, found.damping, strict=True):
+            require(damping > 1e-9, "workpiece damping", float(damping), f"at {frequency:.0f} Hz",
                     "a loss factor of the material, or damping of chuck or support")
-            largest = float(lateral[np.argmax(np.abs(lateral[:, k])), k])
-            share = float(at_contact[k]) / largest
-            shape = (share, 0.0, 0.0) if axis == 0 else (0.0, share, 0.0)
-            if abs(share) > 1e-9:
-                modes.append(Mode(float(frequency), float(damping), 1 / largest**2, shape))
+        largest = np.abs(plane.reach[::2] @ found.shapes).max(axis=0)
+        at_contact = plane.row(contact) @ found.shapes
+        phase = _phases(found, at_contact)
+        for k, share in enumerate(np.abs(at_contact) / largest):
+            shape = (float(share), 0.0, 0.0) if axis == 0 else (0.0, float(share), 0.0)
+            if share > 1e-9:
+                modes.append(Mode(float(found.frequency[k]), float(found.damping[k]), 1 / float(largest[k]) ** 2, shape,
+                                  phase=float(phase[k])))
     return Structure(tuple(modes), "machine")
+
+
+def _phases(found: DampedModes, at_contact: Complexes) -> Floats:
+    """Phases [rad] of the residues at one place; 0 where those of the kept modes alone would not make a structure."""
+    phase = np.clip(np.angle(at_contact**2), -1.4, 1.4)
+    shapes = np.zeros((3, phase.size))
+    shapes[0] = np.abs(at_contact)
+    model = ModalModel(found.frequency, found.damping, shapes, shapes, phase)
+    return phase if velocity_left(model) < CANCELLATION / 2 and power_fault(model) is None else np.zeros_like(phase)
 
 
 def contact_place(op: Operation, conditions: Conditions, machine_from_tool: Floats, z: float) -> tuple[float, bool]:
