@@ -201,13 +201,18 @@ def solve(problem: StabilityProblem, tolerance: float = 1e-4) -> FloquetVerdict:
     """
     error = np.inf
     for base_nodes in REFINEMENTS:
-        found = period_map(problem, base_nodes, _probes(problem))
-        result = verdict_from_map(found.matrix, found.displacement, found.period)
+        result = verdict_at(problem, base_nodes)
         finer = abs(leading_multiplier(problem, base_nodes + FINER))
         error = max(abs(result.spectral_radius - finer), TOLERANCE * max(1.0, finer))
         if error < tolerance * max(1.0, result.spectral_radius):
             break
     return replace(result, error=error)
+
+
+def verdict_at(problem: StabilityProblem, base_nodes: float = BASE_NODES) -> FloquetVerdict:
+    """Verdict at one resolution, without an estimate of its error; base_nodes: as in period_map."""
+    found = period_map(problem, base_nodes, _probes(problem))
+    return verdict_from_map(found.matrix, found.displacement, found.period)
 
 
 def _probes(problem: StabilityProblem) -> int:

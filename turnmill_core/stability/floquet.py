@@ -119,7 +119,8 @@ def spectrum_lines(
     if total == 0:
         return ()
     lines: dict[int, ChatterLine] = {}
-    for f, q, p in sorted(zip(frequency, order, power / total, strict=True), key=lambda item: -item[2]):
+    strongest = np.argsort(-power)[:8 * count]
+    for f, q, p in zip(frequency[strongest], order[strongest], power[strongest] / total, strict=True):
         key = round(f * period * 1e6)
         held = lines.get(key)
         lines[key] = ChatterLine(float(f), int(q), float(p)) if held is None else ChatterLine(

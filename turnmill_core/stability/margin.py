@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.prediction import PredictedType
-from turnmill_core.stability.collocation import solve
+from turnmill_core.stability.collocation import solve, verdict_at
 from turnmill_core.stability.delay import DelayModel
 from turnmill_core.stability.floquet import chatter_family
 from turnmill_core.stability.lobes import Lobes as Lobes
@@ -148,7 +148,7 @@ def stability_margin(
     limit = depth_limit(intervals, conditions.depth)
     limit_type, limit_frequency = PredictedType.UNKNOWN, NAN
     if 0 < limit < searched:
-        above = solve(family.problem(min(limit * 1.005, searched)))
+        above = verdict_at(family.problem(min(limit * 1.005, searched)))
         limit_type, limit_frequency = above.predicted_type, above.chatter_frequency
     nearest = conditions.tool_speed
     if point.predicted_type in (PredictedType.HOPF, PredictedType.FLIP):

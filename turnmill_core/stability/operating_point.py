@@ -73,13 +73,12 @@ class DepthFamily:
     def problem(self, depth: float, tool_speed: float | None = None) -> StabilityProblem:
         """The problem at a depth [m] and tool_speed [rad/s] (None: the conditions')."""
         heights, start, stop = self.arcs([depth])
-        op, conditions = self.op, at_depth(self.op, self.conditions, depth, tool_speed)
-        delays, variation = regeneration(op, conditions, self.delay_model)
-        structure, flank = self.structure(depth, tool_speed), op.process_damping
-        damping = (0.0, 0.0) if flank is None else (
-            flank.coefficient(op.tool.radius * conditions.tool_speed), flank.friction)
+        op, speed = self.op, self.conditions.tool_speed if tool_speed is None else tool_speed
+        delays, variation = self.delays(speed, depth)
+        structure, flank = self.structure(depth, speed), op.process_damping
+        damping = (0.0, 0.0) if flank is None else (flank.coefficient(op.tool.radius * speed), flank.friction)
         return StabilityProblem(
-            structure=structure.linear, rotating=structure.rotating, tool_speed=conditions.tool_speed,
+            structure=structure.linear, rotating=structure.rotating, tool_speed=speed,
             pitch=tuple(float(p) for p in op.tool.pitch), delays=delays, delay_variation=variation,
             helix_lag=math.tan(op.tool.helix_angle) / op.tool.radius,
             coefficients=(op.material.Ktc, op.material.Krc, op.material.Kac),
@@ -87,8 +86,35 @@ class DepthFamily:
 
     def structure(self, depth: float | None = None, tool_speed: float | None = None) -> ContactStructure:
         """Structure at the cutting point for a depth [m] and tool_speed [rad/s] (None: the conditions')."""
+        return self._still or self._structure_at(depth, tool_speed)
+
+    def _structure_at(self, depth: float | None, tool_speed: float | None) -> ContactStructure:
         there = at_depth(self.op, self.conditions, depth, tool_speed)
         return structure_at(self.op, machine_from_tool(self.op, there), there, self.position)
+
+    @cached_property
+    def _still(self) -> ContactStructure | None:
+        """The structure where neither depth nor tool speed change it."""
+        parts = (self.op.tool.structure, self.op.workpiece.structure)
+        moving = self.by_depth or any(
+            s.frame == "rotating" or (s.table is not None and "tool_speed" in s.table.axes) for s in parts)
+        return None if moving else self._structure_at(None, None)
+
+    @cached_property
+    def by_depth(self) -> bool:
+        """Whether the depth of cut changes the structure: it weighs the contact points, and thins the bar."""
+        return bool(self.op.tool.structure.heights or self.op.workpiece.structure.heights
+                    or self.op.workpiece.beam is not None)
+
+    def delays(self, tool_speed: float, depth: float) -> tuple[tuple[float, ...], float]:
+        """Mean delay [s] of each tooth, variation [1] (see StabilityProblem) at tool_speed [rad/s] and depth [m]."""
+        cut, pitch, variation = self.conditions, self.op.tool.pitch, 0.0
+        mean = self.delay_model == "mean"
+        delays = mean_delay(pitch, tool_speed, cut.workpiece_speed) if mean else tooth_period(pitch, tool_speed)
+        if self.delay_model == "first-principles":
+            surface = cut.workpiece_speed * (cut.effective_radius + cut.depth - depth / 2)
+            variation = delay_variation(self.op.tool.radius, tool_speed, surface)
+        return tuple(float(t) for t in delays), variation
 
     @cached_property
     def deepest(self) -> StabilityProblem:
@@ -108,17 +134,12 @@ class DepthFamily:
     def multipliers(self, series: DepthSeries, tool_speed: float | None = None) -> Complexes:
         """Leading multipliers of the series at tool_speed [rad/s] (None: the conditions')."""
         speed = self.conditions.tool_speed if tool_speed is None else tool_speed
-        variation = np.zeros(len(series.heights))
+        delays, variation = self.delays(speed, 0.0)[0], np.zeros(len(series.heights))
         if self.delay_model == "first-principles":
-            found = [regeneration(self.op, at_depth(self.op, self.conditions, float(a), speed), self.delay_model)
-                     for a in series.heights[:, -1]]
-            delays, variation = found[0][0], np.array([v for _, v in found])
-        else:
-            delays = regeneration(self.op, at_depth(self.op, self.conditions, None, speed), self.delay_model)[0]
-        shapes = (self.op.tool.structure, self.op.workpiece.structure)
-        if not any(shape.heights for shape in shapes) and self.op.workpiece.beam is None:
+            variation = np.array([self.delays(speed, float(a))[1] for a in series.heights[:, -1]])
+        if not self.by_depth:
             return series_multipliers(series, speed, delays, variation, self.structure(tool_speed=speed).linear)
-        return np.concatenate([  # the depth of cut weighs the contact points, and thins the bar
+        return np.concatenate([
             series_multipliers(series.one(i), speed, delays, variation[i:i + 1],
                                self.structure(float(series.heights[i, -1]), speed).linear)
             for i in range(len(series.heights))])
@@ -169,22 +190,6 @@ def _places(depth: float, kink: float) -> Floats:
 def _falling(intervals: int) -> Floats:
     """Equally spaced numbers from 1 to 0, read-only."""
     return frozen_array(np.linspace(1.0, 0.0, intervals + 1), "fractions", (-1,))
-
-
-def regeneration(op: Operation, conditions: Conditions, delay_model: DelayModel) -> tuple[tuple[float, ...], float]:
-    """Mean delay [s] of each tooth and its variation [1] (see StabilityProblem) of `op` at `conditions`.
-
-    delay_model: as in stability_problem.
-    """
-    pitch, variation = op.tool.pitch, 0.0
-    if delay_model == "mean":
-        delays = mean_delay(pitch, conditions.tool_speed, conditions.workpiece_speed)
-    else:
-        delays = tooth_period(pitch, conditions.tool_speed)
-    if delay_model == "first-principles":
-        surface = conditions.workpiece_speed * (conditions.effective_radius + conditions.depth / 2)
-        variation = delay_variation(op.tool.radius, conditions.tool_speed, surface)
-    return tuple(float(t) for t in delays), variation
 
 
 def _bar_arcs(op: Operation, deepest: Conditions, kink: float) -> tuple[Floats, Floats, Floats]:
