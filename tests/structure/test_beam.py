@@ -151,7 +151,7 @@ def test_a_stepped_bar_of_one_diameter_is_the_plain_one() -> None:
 
 
 def test_damped_modes_are_the_poles_of_the_elements() -> None:
-    """Frequency and damping against the eigenvalues of the whole first-order system, with a strong damper at one place."""
+    """Frequency and damping against the eigenvalues of the whole system, with a strong damper at one place."""
     held = with_supports(free_bar(cylinder(0.4, 0.04), STEEL), (Support(0.4, 4e8, 0.0), Support(0.25, 2e7, 900.0)))
     n = held.M.shape[0]
     inverse = np.linalg.inv(held.M)
