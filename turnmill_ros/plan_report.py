@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bokeh.models import Range1d
+from bokeh.models import NumeralTickFormatter, Range1d
 from bokeh.plotting import figure
+from numpy.typing import NDArray
 
 from turnmill_core.process.plan import Choice, Plan
 from turnmill_core.process.region import Region
@@ -108,6 +109,11 @@ def region_map(
         plot.image_rgba(image=[rgba], x=speed[0], y=bottom, dw=speed[-1] - speed[0], dh=dh)
         plot.scatter([math.nan], [math.nan], marker="square", size=12, fill_color=colour, line_color="#444444",
                      fill_alpha=0.75, legend_label=name)
+    for name, dash in (("stability", "dashed"), ("tool spindle", "dotted"), ("workpiece spindle", "dotdash")):
+        for k, margin in enumerate(found.margins):
+            if margin.name.startswith(name):
+                plot.line(speed, _first_limit(depth, found.stacked[k]), color="#333333", line_dash=dash, line_width=1.5,
+                          legend_label=f"limit: {margin.name}")
     limit = np.where(found.depth_limit > 0, found.depth_limit, math.nan) * 1e3
     if np.isfinite(limit).any():
         plot.line(speed, limit, color="#000000", line_width=2, legend_label="deepest feasible cut")
@@ -118,6 +124,18 @@ def region_map(
     plot.x_range, plot.y_range = Range1d(speed[0], speed[-1]), Range1d(0, bottom + dh)
     figures.legend_right(plot)
     return plot
+
+
+def _first_limit(depth: NDArray[np.float64], margin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Depth (n,) at which a margin (m, n) first falls below 0, NaN where it does not on the grid `depth` (m,)."""
+    limit = np.full(margin.shape[1], math.nan)
+    for j, column in enumerate(margin.T):
+        beyond = np.flatnonzero(column < 0)
+        if beyond.size:
+            i = int(beyond[0])
+            share = column[i - 1] / (column[i - 1] - column[i]) if i and np.isfinite(column[i]) else 0.0
+            limit[j] = depth[i - 1] + share * (depth[i] - depth[i - 1]) if i else depth[0]
+    return limit
 
 
 def _packed(colour: str, alpha: float = 0.75) -> int:
@@ -131,6 +149,7 @@ def rates(made: Plan) -> figure:
     plot = figures.new_figure("Largest removal rate within all limits", "tool speed [rpm]",
                               "removal rate [mm\u00b3/min]", 340)
     dashes = ("solid", "dashed", "dotdash", "dotted")
+    several = len({r.feed for r in made.regions}) > 1
     shown = [(r, c) for r, c in zip(made.regions, made.choices, strict=True) if c is not None]
     for k, (found, choice) in enumerate(shown):
         limit = found.depth_limit
@@ -139,11 +158,13 @@ def rates(made: Plan) -> figure:
             rate = np.interp(limit, np.concatenate([[0.0], found.depths]), np.concatenate([[0.0], found.rate]))
         else:
             rate = found.rate[-1] * limit / top
+        name = _title(found) if several else _title(found).split(", ")[0]
         plot.line(found.tool_speeds * RPM, np.where(limit > 0, rate, math.nan) * 6e10, line_width=2,
-                  color=figures.LINE_COLOURS[k % 6], line_dash=dashes[k // 6 % 4], legend_label=_title(found))
+                  color=figures.LINE_COLOURS[k % 6], line_dash=dashes[k // 6 % 4], legend_label=name)
         plot.scatter([choice.conditions.tool_speed * RPM], [choice.rate * 6e10], marker="star", size=12,
-                     color=figures.LINE_COLOURS[k % 6], line_color="#000000", legend_label=_title(found))
+                     color=figures.LINE_COLOURS[k % 6], line_color="#000000", legend_label=name)
     plot.y_range.start = 0
+    plot.yaxis.formatter = NumeralTickFormatter(format="0")
     figures.legend_right(plot)
     return plot
 
@@ -152,6 +173,7 @@ def trade(made: Plan, chosen: Choice | None) -> figure:
     """Cuts that no other beats in both removal rate [mm3/min] and form error [um]."""
     plot = figures.new_figure("Cuts that no other beats in both", "removal rate [mm\u00b3/min]",
                               "form error [um]", 320)
+    plot.xaxis.formatter = NumeralTickFormatter(format="0")
     rate, error = [t.rate * 6e10 for t in made.pareto], [t.form_error * 1e6 for t in made.pareto]
     plot.line(rate, error, color="#999999", line_dash="dotted")
     speeds = sorted({abs(t.workpiece_speed) for t in made.pareto})

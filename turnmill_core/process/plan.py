@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from turnmill_core.cutting.engagement import removal_rate
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Conditions, Operation, require
-from turnmill_core.process.cut_values import Progress, cut_values, load_table, with_feed
+from turnmill_core.process.cut_values import Progress, cut_values, feed_of, load_table, with_feed
 from turnmill_core.process.limits import LimitMargin, limit_margins
 from turnmill_core.process.region import TINY, Conflict, Region, conflicts, region
 
@@ -130,7 +130,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Trade:
-    """A cut of the trade between removal rate and form error, on the grid.
+    """A cut of the trade between removal rate and form error.
 
     tool_speed, workpiece_speed [rad/s]; depth [m]; feed [m/rev]; rate [m3/s]; form_error [m].
     """
@@ -164,7 +164,7 @@ def plan(op: Operation, grid: Grid | None = None, tell: Tell | None = None) -> P
             regions.append(region(fed, table, speeds, sense * turning, progress=_within(tell, k, parts, turning)))
     tell(1.0, "choice")
     choices = tuple(choose(r) for r in regions)
-    return Plan(op, tuple(regions), choices, tuple(conflicts(r) for r in regions), pareto_front(regions))
+    return Plan(op, tuple(regions), choices, tuple(conflicts(r) for r in regions), pareto_front(regions, choices))
 
 
 def _within(tell: Tell, part: int, parts: int, workpiece_speed: float) -> Progress:
@@ -213,9 +213,13 @@ def _checked(found: Region, tool_speed: float, depth: float) -> Choice | None:
     return None
 
 
-def pareto_front(regions: Sequence[Region]) -> tuple[Trade, ...]:
-    """Feasible cuts of the grids that no other beats in both removal rate and form error, by rising rate."""
-    trades = []
+def pareto_front(regions: Sequence[Region], choices: Sequence[Choice | None]) -> tuple[Trade, ...]:
+    """Feasible cuts that no other beats in both removal rate and form error, by rising rate.
+
+    regions: their grids count; choices: and these cuts.
+    """
+    trades = [Trade(c.conditions.tool_speed, c.conditions.workpiece_speed, c.conditions.depth, feed_of(c.op), c.rate,
+                    c.form_error) for c in choices if c is not None and math.isfinite(c.form_error)]
     for r in regions:
         error = np.broadcast_to(r.values.form_error, r.least.shape)
         for i, row in enumerate(np.where(r.feasible, error, math.inf)):
