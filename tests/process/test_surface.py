@@ -172,6 +172,19 @@ def brute_force(op: Operation, angle: float, axial: float, vibration: np.ndarray
 
 
 @pytest.mark.parametrize(("eccentricity", "sense"), [(0.0, "up"), (3e-3, "down")])
+def test_surface_of_an_eccentric_tool_that_vibrates(eccentricity: float, sense: str) -> None:
+    """Form error and map take the numeric engagement; a tool just beside the axis is as good as one on it."""
+    op = dished(turn_milling(FLEXIBLE, sense=sense))
+    beside = replace(op, eccentricity=1e-9 if eccentricity == 0 else eccentricity)
+    found, centred = form_error(beside, op.conditions), form_error(op, op.conditions)
+    assert found.overcut > 0
+    if eccentricity == 0:
+        assert found.overcut == pytest.approx(centred.overcut, rel=0.02)
+        lowest, plain = (surface_map(o, op.conditions, around=0.01, columns=10, rows=8).height for o in (beside, op))
+        np.testing.assert_allclose(lowest, plain, atol=3e-8)
+
+
+@pytest.mark.parametrize(("eccentricity", "sense"), [(0.0, "up"), (3e-3, "down")])
 def test_envelope_against_brute_force(eccentricity: float, sense: str) -> None:
     """Dish, corner, wiper, axial runout, uneven pitch, vibration, eccentric tool, both senses."""
     op = turn_milling((), speed=500 * RPM, workpiece_speed=8 * RPM, depth=1e-3, sense=sense, teeth=3, axial_feed=5e-3,
@@ -181,6 +194,7 @@ def test_envelope_against_brute_force(eccentricity: float, sense: str) -> None:
     phase = np.arange(360) * (2 * math.pi / 360)
     vibration = 4e-6 * np.sin(3 * phase) + 2e-6 * np.cos(7 * phase)
     found = surface_map(op, op.conditions, around=0.5, columns=2, rows=3, vibration=(phase, vibration))
+    assert surface_map(op, op.conditions, around=0.02, rows=150, vibration=(phase, vibration)).undercut < 9e-4
     for i in range(3):
         for j in range(2):
             expected = brute_force(op, found.angle[j], found.axial[i], vibration, 3)
@@ -200,7 +214,7 @@ def test_kernel_and_its_plain_version_agree(monkeypatch: pytest.MonkeyPatch) -> 
     op = dished(turn_milling((), speed=900 * RPM, workpiece_speed=8 * RPM, depth=1e-3), 0.5e-3, corner_radius=0.2e-3)
     vibration = (np.zeros(4), np.array([0.0, 1e-6, -1e-6, 2e-6]))
     compiled = surface_map(op, op.conditions, around=0.1, columns=6, rows=5, vibration=vibration).height
-    for name in ("_ahead", "bottom_height"):
+    for name in ("_ahead", "bottom_height", "_lowest_pass"):
         monkeypatch.setattr(kernels, name, getattr(kernels, name).py_func)
     monkeypatch.setattr("turnmill_core.process.surface_map.envelope", kernels.envelope.py_func)
     plain = surface_map(op, op.conditions, around=0.1, columns=6, rows=5, vibration=vibration).height

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.cutting.chip import prepare_cut
+from turnmill_core.cutting.chip import Cut, prepare_cut
 from turnmill_core.cutting.forces import revolve
+from turnmill_core.cutting.loads import part_of
+from turnmill_core.cutting.steady import steady_map
 from turnmill_core.machine.conditions import machine_from_tool
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.process.linear import linear_map
@@ -47,10 +49,11 @@ class FormError:
 def form_error(op: Operation, conditions: Conditions) -> FormError:
     """Form error of a turn-milled surface, fast enough for a search: closed forms and `forced_response`.
 
-    Zero without contact. Raises ``ValueError`` for milling, where a flat floor has no such error, and for a workpiece
-    that turns half a turn or more between teeth.
+    Zero without contact. Raises ``ValueError`` for milling, where a flat floor has no such error, for a tilted tool,
+    and for a workpiece that turns half a turn or more between teeth.
     """
     require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
+    require(op.tilt == 0, "tilt", op.tilt, "rad", "0: the form error of a tilted tool is not described")
     if not conditions.in_cut:
         return FormError(0.0, 0.0, 0.0, 0.0)
     shape = op.tool.shape
@@ -79,7 +82,7 @@ def forced_response(op: Operation, conditions: Conditions) -> tuple[Floats, Floa
     milling with equal pitch this is the periodic orbit of the linear cut, because the chip does not see a vibration
     that repeats from tooth to tooth; in turn-milling the rest is of the order of Omega_c / Omega_t.
     """
-    force = revolve(op, prepare_cut(op, conditions, ELEMENTS), ANGLES, average=True).force_tool
+    force = revolve(op, rigid_cut(op, conditions), ANGLES, average=True).force_tool
     lines = np.fft.rfft(force, axis=0)
     structure = structure_at(op, machine_from_tool(op, conditions), conditions).linear
     receptance = structure.frf(np.arange(len(lines)) * conditions.tool_speed / (2 * np.pi))
@@ -88,14 +91,23 @@ def forced_response(op: Operation, conditions: Conditions) -> tuple[Floats, Floa
     return angle, np.asarray(moved, dtype=np.float64)
 
 
+def rigid_cut(op: Operation, conditions: Conditions) -> Cut:
+    """The side edges' rigid cut, in closed form where there is one, else with the numeric engagement."""
+    if op.tool.shape.is_cylinder and op.eccentricity == 0:
+        return prepare_cut(op, conditions, ELEMENTS)
+    found = steady_map(op, conditions, ELEMENTS, 1)
+    return part_of(op, found, ~found.elements.bottom)
+
+
 def printed_extremes(op: Operation, conditions: Conditions, angle: Floats, axial: Floats) -> tuple[float, float]:
     """Undercut and overcut [m], >= 0: extremes of `axial` [m] (n,) while some tooth's tip is in the cut.
 
     axial: displacement of the tool against the workpiece along +z_T at tool angles `angle` [rad] (n,).
     """
-    arcs = prepare_cut(op, conditions, ELEMENTS).engagement  # the first height is next to the tip
-    turned = np.mod(angle[:, None] + np.cumsum((0.0, *op.tool.pitch[:-1])) - arcs.start[0, 0], 2 * np.pi)
-    printing = np.any(turned <= arcs.exit[0, 0] - arcs.start[0, 0], axis=1)
+    arcs = rigid_cut(op, conditions).engagement
+    start, stop = arcs.start[0], arcs.exit[0]  # of the height next to the tip
+    tips = angle[:, None, None] + np.cumsum((0.0, *op.tool.pitch[:-1]))[:, None]
+    printing = np.any((np.mod(tips - start, 2 * np.pi) <= stop - start) & (stop > start), axis=(1, 2))
     chosen = axial[printing] if printing.any() else axial
     return float(max(0.0, chosen.max())), float(max(0.0, -chosen.min()))
 

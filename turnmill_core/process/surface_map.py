@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.cutting.chip import prepare_cut
 from turnmill_core.cutting.feed import cross_feed_sense
 from turnmill_core.operation import Conditions, Operation, require
 from turnmill_core.operation_cutter import outline
 from turnmill_core.process._kernels.envelope import bottom_height, envelope
-from turnmill_core.process.surface import ELEMENTS, steady_axial
+from turnmill_core.process.surface import rigid_cut, steady_axial
 from turnmill_core.process.surface_profile import surface_feed_per_tooth
 
 Floats = NDArray[np.float64]
@@ -36,6 +35,8 @@ ACROSS = 1200
 CHOSEN = 3_000_000
 LARGEST = 20_000_000
 CHUNK = 500
+PASS_SPACING = 1.2
+"""Distance along x_T within which a tooth surely passes, in feeds: a trailing edge swings with the material."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ def _lowest(
     offset = math.copysign(op.eccentricity, conditions.workpiece_speed * op.eccentricity)
     lead = cross_feed_sense(conditions) * conditions.feed_speed / speed
     spread = float(np.ptp(moved)) + float(np.ptp(runout))
-    feed = surface_feed_per_tooth(op, conditions) * (tool.teeth if np.ptp(runout) > 0 else 1)
+    feed = PASS_SPACING * surface_feed_per_tooth(op, conditions) * (tool.teeth if np.ptp(runout) > 0 else 1)
     speeds = np.array([conditions.tool_speed, speed])
     window = _window(conditions.effective_radius, bottom, reach, offset, spread, feed)
     height = np.empty((axial.size, angle.size))
@@ -192,8 +193,8 @@ def tooth_print(op: Operation, conditions: Conditions, columns: int = 120, rows:
     """
     require(op.process == "turn-milling", "process", op.process, "", "turn-milling")
     require(conditions.in_cut, "depth", conditions.depth, "m", "a cut (contact, both spindles turning)")
-    arcs = prepare_cut(op, conditions, ELEMENTS).engagement
-    angle = np.linspace(arcs.start[0, 0], arcs.exit[0, 0], columns)
+    arcs = rigid_cut(op, conditions).engagement
+    angle = np.linspace(arcs.start[0].min(), arcs.exit[0].max(), columns)
     place = np.linspace(0.0, surface_feed_per_tooth(op, conditions), rows)
     shape = op.tool.shape
     static = np.maximum(0.0, place - shape.wiper_length) * math.tan(shape.bottom_clearance)

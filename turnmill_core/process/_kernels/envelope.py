@@ -46,8 +46,6 @@ def envelope(
     omega_t, omega_c = speeds[0], speeds[1]
     turn = 2.0 * math.pi
     bins = window.shape[1]
-    steps = vibration.shape[0]
-    least = 2.0 * radius * omega_c / omega_t
     for column in range(angle.shape[0]):
         for row in range(axial.shape[0]):
             # workpiece revolutions in which the tool reaches over this place
@@ -60,37 +58,52 @@ def envelope(
                 b = min(bins - 1, max(0, int((y + reach) * bins / (2.0 * reach))))
                 sure = min(sure, window[3, b])
             lowest = height[row, column]
-            for n in range(first, last + 1):
-                y0 = axial[row] - lead * (angle[column] + n * turn)
-                b = min(bins - 1, max(0, int((y0 + reach) * bins / (2.0 * reach))))
-                if window[2, b] > sure + spread:
-                    continue
-                under = (angle[column] + n * turn) / omega_c
-                begin = under - math.atan((window[1, b] - offset) / radius) / omega_c
-                end = under - math.atan((window[0, b] - offset) / radius) / omega_c
-                for j in range(teeth.shape[0]):
-                    k = math.ceil((_ahead(begin, under, y0, radius, offset, omega_c, least) + omega_t * begin
-                                   + teeth[j, 0]) / turn)
-                    k_last = math.floor((_ahead(end, under, y0, radius, offset, omega_c, least) + omega_t * end
-                                         + teeth[j, 0]) / turn)
-                    while k <= k_last:
-                        t = (k * turn - teeth[j, 0]) / omega_t
-                        t -= _ahead(t, under, y0, radius, offset, omega_c, least) / omega_t
-                        for _ in range(2):
-                            ahead = _ahead(t, under, y0, radius, offset, omega_c, least)
-                            t = (k * turn - teeth[j, 0] - ahead) / omega_t
-                        psi = omega_c * (under - t)
-                        x = radius * math.tan(psi) + offset
-                        y = y0 + lead * omega_c * (under - t)
-                        place = omega_t * t / turn
-                        place = (place - math.floor(place)) * steps
-                        base = int(place)
-                        part = place - base
-                        moved = (1.0 - part) * vibration[base % steps] + part * vibration[(base + 1) % steps]
-                        up = bottom_height(math.sqrt(x * x + y * y), bottom) + moved - teeth[j, 1]
-                        lowest = min(lowest, (radius + up) / math.cos(psi) - radius)
-                        k += 1
+            for attempt in range(2):  # the second, over all revolutions, only where no pass was found
+                for n in range(first, last + 1):
+                    y0 = axial[row] - lead * (angle[column] + n * turn)
+                    b = min(bins - 1, max(0, int((y0 + reach) * bins / (2.0 * reach))))
+                    if attempt == 0 and window[2, b] > sure + spread:
+                        continue
+                    under = (angle[column] + n * turn) / omega_c
+                    begin = under - math.atan((window[1, b] - offset) / radius) / omega_c
+                    end = under - math.atan((window[0, b] - offset) / radius) / omega_c
+                    for j in range(teeth.shape[0]):
+                        lowest = min(lowest, _lowest_pass(
+                            begin, end, under, y0, teeth[j, 0], teeth[j, 1], radius, offset, lead, omega_t, omega_c,
+                            bottom, vibration))
+                if lowest < height[row, column]:
+                    break
             height[row, column] = lowest
+
+
+@njit(cache=True, error_model="numpy")
+def _lowest_pass(
+    begin: float, end: float, under: float, y0: float, tooth: float, stands_out: float, radius: float, offset: float,
+    lead: float, omega_t: float, omega_c: float, bottom: Floats, vibration: Floats,
+) -> float:
+    """Lowest height [m] at which one tooth passes a place between two times [s]; see envelope."""
+    turn, steps = 2.0 * math.pi, vibration.shape[0]
+    least = 2.0 * radius * omega_c / omega_t
+    k = math.ceil((_ahead(begin, under, y0, radius, offset, omega_c, least) + omega_t * begin + tooth) / turn)
+    last = math.floor((_ahead(end, under, y0, radius, offset, omega_c, least) + omega_t * end + tooth) / turn)
+    lowest = math.inf
+    while k <= last:
+        t = (k * turn - tooth) / omega_t
+        t -= _ahead(t, under, y0, radius, offset, omega_c, least) / omega_t
+        for _ in range(2):
+            t = (k * turn - tooth - _ahead(t, under, y0, radius, offset, omega_c, least)) / omega_t
+        psi = omega_c * (under - t)
+        x = radius * math.tan(psi) + offset
+        y = y0 + lead * omega_c * (under - t)
+        place = omega_t * t / turn
+        place = (place - math.floor(place)) * steps
+        base = int(place)
+        part = place - base
+        moved = (1.0 - part) * vibration[base % steps] + part * vibration[(base + 1) % steps]
+        up = bottom_height(math.sqrt(x * x + y * y), bottom) + moved - stands_out
+        lowest = min(lowest, (radius + up) / math.cos(psi) - radius)
+        k += 1
+    return lowest
 
 
 @njit(cache=True, error_model="numpy")
