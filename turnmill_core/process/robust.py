@@ -175,9 +175,9 @@ def robust_choice(made: Plan, draws: Draws, wanted: float = 0.9, tell: Tell | No
         limit = np.where(found.depth_limit > 0, np.minimum(
             np.interp(found.tool_speeds, shares.tool_speeds, shares.deepest(wanted), left=0, right=0),
             found.depth_limit), 0.0)
-        choice = choose(found, limit)
+        choice, less = choose(found, limit), 0.02
         while choice is not None and (share := feasible_share(choice, draws)) < wanted:
-            limit = limit * 0.98
+            limit, less = limit * (1 - less), min(2 * less, 0.5)  # the shares were known on a coarse grid only
             choice = choose(found, limit) if limit.max() > found.depths[0] else None
         if choice is not None and (best is None or choice.rate > best.rate):
             best = replace(choice, share=share)

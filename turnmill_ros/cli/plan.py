@@ -149,6 +149,7 @@ def _speed(workpiece_speed: float) -> str:
 
 
 def _show(made: Plan, shares: list[float], chosen: Choice | None, samples: int, wanted: float) -> None:
+    from turnmill_core.operation_limits import NO_LIMITS
     from turnmill_ros.plan_text import margin_text
 
     rows = []
@@ -167,6 +168,8 @@ def _show(made: Plan, shares: list[float], chosen: Choice | None, samples: int, 
     table(f"{made.op.name}: most productive cut within all limits", (
         "workpiece rpm", *["feed mm"] * feeds, "feasible rpm", "tool rpm", "depth mm", "mm3/min", "binding limit",
         "draws"), rows)
+    if made.op.limits == NO_LIMITS:
+        console.print("the operation has no limits section: only stability and the flute length bound the cut")
     for line in _why(made):
         console.print(f"no cut at {line}", soft_wrap=True)
     if chosen is None:
