@@ -141,6 +141,17 @@ def spectrum(frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], t
     return plot
 
 
+def poincare(points: NDArray[np.float64], extent: tuple[float, float], title: str, unit: str) -> figure:
+    """Once-per-revolution set: points (n, 2) in `unit`, the later ones darker; extent: of the whole signal."""
+    ranges = [Range1d(*extent) for _ in range(2)]
+    plot = new_figure(title, f"signal once per revolution [{unit}]", f"a quarter period later [{unit}]", 430,
+                      x_range=ranges[0], y_range=ranges[1])
+    plot.frame_width = plot.frame_height = 360
+    plot.scatter(points[:, 0], points[:, 1], size=7, color=LINE_COLOURS[0], line_color="#000000",
+                 fill_alpha=np.linspace(0.25, 1.0, len(points)))
+    return plot
+
+
 def lines_over_time(title: str, unit: str, time: Sequence[float], named: dict[str, Sequence[float]],
                     x_range: Range1d | None = None) -> figure:
     """Named values over time [s]."""

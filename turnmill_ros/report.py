@@ -19,7 +19,7 @@ from turnmill_core.operation_file import describe
 from turnmill_ros import figures
 from turnmill_ros.analysis import CHATTER, Analysis, Segment, iso_time, summary, timeline
 from turnmill_ros.predictions import Predictions
-from turnmill_ros.signals import spectrogram, stretch
+from turnmill_ros.signals import poincare, spectrogram, stretch
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222 }
@@ -111,8 +111,8 @@ def _summary_table(analysis: Analysis) -> str:
 
 
 def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
-    """One spectrum per state in the cut: up to one second at the end of its longest segment."""
-    plots = []
+    """Spectrum and Poincare set of every state in the cut: up to one second within its longest segment."""
+    plots: list[tuple[str, Any]] = []
     for kind in (ChatterKind.STABLE, *CHATTER, ChatterKind.FLIP_OR_RUNOUT):
         segments = [s for s in analysis.segments if s.state is kind]
         if not segments:
@@ -133,6 +133,13 @@ def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
         plots.append(("Spectra" if not plots else "", figures.spectrum(
             frequencies, amplitude, f"{kind.name}: {_named(part.channel)}, {length * 1e-9:.2f} s up to {when:.2f} s",
             part.channel.unit, middle.tooth_passing_frequency, middle.chatter_family, middle.chatter_frequency)))
+        points = poincare(part, verdicts)
+        if points is not None:
+            low, high = float(part.samples.min()), float(part.samples.max())
+            margin = 0.05 * (high - low)
+            plots.append(("", figures.poincare(
+                points, (low - margin, high + margin), f"{kind.name}: Poincar\u00e9 set",
+                part.channel.unit)))
     return plots
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
+from turnmill_core.monitoring.poincare import poincare_set
+from turnmill_core.monitoring.verdict import Verdict
 from turnmill_ros import topics
 from turnmill_ros.bag import read_bag
 from turnmill_ros.conversions import block_from_message
@@ -113,3 +115,15 @@ def stretch(path: Path, channel: str, from_ns: int, to_ns: int) -> Stretch | Non
     if first is None or sum(map(len, parts)) < 64:
         return None
     return Stretch(first[0], first[1], first[2], np.concatenate(parts))
+
+
+def poincare(part: Stretch, verdicts: Sequence[Verdict]) -> NDArray[np.float64] | None:
+    """Once-per-revolution set (n, 2) of a stretch, at the speed that the verdicts found; None without one."""
+    known = [v for v in verdicts if np.isfinite(v.spindle_speed) and v.spindle_speed > 0]
+    if not known:
+        return None
+    time = part.start_ns * 1e-9 + np.arange(len(part.samples)) / part.sample_rate
+    middle = [(v.window_start_ns + v.window_end_ns) * 5e-10 for v in known]
+    speed = np.interp(time, middle, [v.spindle_speed for v in known])
+    turns = np.concatenate([[0.0], np.cumsum(speed)[:-1]]) / (2 * np.pi * part.sample_rate)
+    return poincare_set(part.samples, turns) if turns[-1] >= 3 else None

@@ -1,0 +1,147 @@
+"""The detection benchmark: the same signals again from the same numbers, fair scores, and what the monitor is worth."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnmill_core.detection.bench import FULL, curves, run, tally
+from turnmill_core.detection.cuts import KINDS, TRAIN_END, make_cut
+from turnmill_core.detection.endless import go_on
+from turnmill_core.detection.hearing import INDICATORS, Heard, hear_cut, wrong_prior
+from turnmill_core.detection.recordings import RATE, Episode, Motion, episode, observe, simulate_cut, true_kind
+from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_core.prediction import PredictedType
+
+
+def heard(states: str, truth: str, scores: list[float] | None = None, **changes: object) -> Heard:
+    """A signal of 50 ms windows by letters: A air, S stable, H Hopf, F flip, R flip or runout, - no truth."""
+    codes = {"-": -1, "A": 1, "S": 2, "H": 4, "F": 5, "R": 6}
+    count = len(states)
+    table = np.zeros((count, len(INDICATORS)), dtype=np.float32)
+    table[:, 0] = scores or [1.5 if s in "HF" else 0.1 for s in states]
+    made = Heard("chatter", 1, 4, 0.05 * count, 0.05 * (1 + np.arange(count)),
+                 np.array([codes[c] for c in truth], dtype=np.int8),
+                 np.array([codes[c] for c in states], dtype=np.int8), table, None, 0.01, math.nan, np.zeros(0, dtype=np.int8))
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def test_false_alarms_touch_no_chatter() -> None:
+    found = tally([heard("SSHHSSSSSSSHHHH", "SSSSSSSSS--HHHH")])
+    assert found.false_alarms == 1
+    assert found.hours == pytest.approx(9 * 0.05 / 3600)
+    assert found.confusion[ChatterKind.HOPF, ChatterKind.HOPF] == 4
+    assert found.confusion[ChatterKind.STABLE, ChatterKind.HOPF] == 2
+    assert found.raised == ("chatter 1",)
+
+
+def test_chatter_is_found_when_the_verdict_stands_in_time() -> None:
+    true = Episode(ChatterKind.HOPF, 0.2, 0.3, 0.25)
+    early = heard("SSSSSSHHHH" + 6 * "H", "SSSS" + 12 * "H", episode=true)
+    late = heard("S" * 13 + "HHH", "SSSS" + 12 * "H", episode=true)
+    found = tally([early, late])
+    assert found.hopf == (1, 2)
+    assert found.missed == ("chatter 1",)
+    ramp = tally([replace(early, kind="ramp"), replace(late, kind="ramp")])
+    assert ramp.delays == pytest.approx((0.15, 0.5))
+    assert ramp.tripled == pytest.approx((0.05, 0.05))
+
+
+def test_curves_count_runs_of_two_windows_at_equal_recall() -> None:
+    scores = [0.9, 0.1, 0.9, 0.9, 0.1, 0.1, 0.8, 0.8, 0.85, 0.95]
+    recalls, false_at = curves([heard("SSSSSSHHHH", "SSSSSSHHHH", scores)], count=4)
+    hours = 6 * 0.05 / 3600
+    assert recalls == pytest.approx([0.025, 0.35, 0.675, 1.0])
+    assert false_at[:, 0] * hours == pytest.approx([0, 1, 1, 1])
+
+
+def test_even_teeth_need_a_prior_and_odd_ones_do_not() -> None:
+    even = heard("RRRR", "FFSS", with_prior=np.array([5, 2, 2, 2], dtype=np.int8))
+    found = tally([even, heard("HHHH", "HHHH")])
+    assert found.half_order_prior == (3, 4)
+    assert found.half_order == (4, 4)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_cuts_are_made_from_kind_and_number_alone(kind: str) -> None:
+    cut, again, other = make_cut(kind, 3), make_cut(kind, 3), make_cut(kind, 4)
+    assert cut.operation == again.operation
+    assert cut.operation != other.operation
+    if kind.startswith("flip"):
+        assert cut.operation.tool.teeth % 2 == (1 if kind == "flip_odd" else 0)
+        assert cut.margin.limit_type is PredictedType.FLIP
+    if kind in ("stable", "resonance", "runout"):
+        assert cut.margin.predicted_type is PredictedType.STABLE
+
+
+def test_unknown_kinds_are_refused() -> None:
+    with pytest.raises(ValueError, match="stable, resonance"):
+        make_cut("loud", 1)
+
+
+def test_wrong_model_is_wrong_and_the_same_again() -> None:
+    cut = make_cut("flip_even", 0)
+    prior = wrong_prior(cut)
+    assert prior == wrong_prior(cut)
+    assert prior.spectral_radius != pytest.approx(cut.margin.spectral_radius, rel=1e-6)
+
+
+def test_truth_is_the_attractors() -> None:
+    cut = make_cut("flip_odd", 2)
+    assert true_kind(cut, 0.5, 0.0) is ChatterKind.HOPF
+    assert true_kind(cut, 0.05, 0.5) is ChatterKind.FLIP
+    assert true_kind(cut, 0.18, 0.5) is None
+    assert true_kind(make_cut("runout", 0), 0.02, 0.6) is ChatterKind.STABLE
+
+
+@pytest.fixture(scope="module")
+def chatter() -> Motion:
+    return simulate_cut(make_cut("chatter", 0))
+
+
+def test_tachometer_error_and_noise_are_all_that_differs(chatter: Motion) -> None:
+    seen, wrong = observe(chatter), observe(chatter, 0.01)
+    assert np.array_equal(seen.samples, wrong.samples)
+    assert wrong.speeds[5].speed / seen.speeds[5].speed == pytest.approx(1.01, rel=3e-3)
+    assert len(seen.samples) == len(chatter.samples)
+    true = episode(chatter.cut, seen)
+    assert true is not None
+    assert true.kind is ChatterKind.HOPF
+    assert true.begin <= true.full <= chatter.duration
+
+
+def test_what_goes_on_repeats_with_the_revolution() -> None:
+    motion = simulate_cut(make_cut("runout", 1))
+    seen = go_on(motion, "runout", 1, 0, seconds=8.0)
+    assert len(seen.samples) == 8 * RATE
+    assert seen.turns[-1] == pytest.approx(8 * motion.cut.operation.conditions.tool_speed / (2 * math.pi), rel=3e-3)
+    quiet = go_on(motion, "air", 1, 0, seconds=8.0)
+    assert quiet.samples.std() < seen.samples.std()
+
+
+def test_monitor_hears_chatter_and_nothing_else() -> None:
+    found = hear_cut("chatter", TRAIN_END + 1)
+    assert found.scores.shape == (len(found.state), len(INDICATORS))
+    stable = hear_cut("stable", TRAIN_END + 1)
+    both = tally([found, stable])
+    assert both.false_alarms == 0
+    assert both.hopf[0] == both.hopf[1] >= 1
+    assert both.areas[0] >= max(both.areas[1:])
+
+
+@pytest.mark.slow
+def test_the_whole_corpus() -> None:
+    """Hours of signal: every figure that docs/model_monitoring.md promises."""
+    found = tally(run(FULL, os.cpu_count() or 1))
+    assert found.hours > 10
+    assert found.false_alarms <= found.hours
+    assert found.hopf[0] >= 0.95 * found.hopf[1] > 0
+    assert found.flip_odd[0] >= 0.9 * found.flip_odd[1] > 0
+    assert found.half_order_prior[0] >= 0.9 * found.half_order_prior[1] > 0
+    assert found.half_order[0] == found.half_order[1]
+    assert float(np.nanmedian(found.delays)) < 0.3
+    assert found.areas[0] > max(found.areas[1:])
