@@ -16,6 +16,7 @@ from turnmill_ros.cli import (
     chuck,
     delay,
     detect_bench,
+    engagement,
     forces,
     identify,
     lobes,
@@ -42,7 +43,7 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
 )
 for module in (
-    model, forces, identify, modes, vibration, surface, stability, lobes, delay, recordings, online,
+    model, forces, engagement, identify, modes, vibration, surface, stability, lobes, delay, recordings, online,
     toolpath, plan, positions, workpiece, chuck, detect_bench,
 ):
     module.register(app)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnmill_ros.cli.output import console, print_json, progress, quantity, table
-from turnmill_ros.errors import InputError
+from turnmill_ros.cli.output import console, print_json, progress, table
+from turnmill_ros.cli.path_states import path_states
 
 if TYPE_CHECKING:
     from turnmill_core.cutting.along_path import Method, PathLoads
 
-MOST_STATES, RATE = 2000, 50.0
 HEADER = ("quantity", "value", "at")
 
 
@@ -24,30 +22,10 @@ def show_path(
 ) -> None:
     """Predict along a path file and print what was found; `report` is a new file."""
     from turnmill_core.cutting.along_path import loads_along
-    from turnmill_core.machine.apt import read_apt
-    from turnmill_core.machine.kinematics import NT3150, RotaryAxis, with_tool_length
-    from turnmill_core.machine.path_motion import axis_states, path_motion
-    from turnmill_core.machine.toolpath import with_workpiece_speed
-    from turnmill_ros.machine_file import read_machine
     from turnmill_ros.operations import find_operation
 
     op = find_operation(op_name, changes or ())
-    datum = op.workpiece.datum
-    machine = dataclasses.replace(NT3150, workpiece_datum=datum, c=RotaryAxis(NT3150.c.direction, datum))
-    if machine_file is not None:
-        machine, _ = read_machine(machine_file)
-        if machine.workpiece_datum != datum:
-            raise InputError("the machine's workpiece datum is not that of the operation", file=machine_file,
-                             value=machine.workpiece_datum, expected=str(datum))
-    length = quantity(tool_length, "m", "--tool-length")
-    found = read_apt(file.read_text(encoding="utf-8", errors="replace"), str(file))
-    speed = quantity(workpiece_speed, "rad/s", "--workpiece-speed")
-    route = found.path if speed is None else with_workpiece_speed(found.path, speed)
-    motion = path_motion(with_tool_length(machine, length) if length else machine, route)
-    if motion.duration == 0:
-        raise InputError("the path has no motion", file=file)
-    frequency = quantity(rate, "Hz", "--rate") or min(RATE, MOST_STATES / motion.duration)
-    states = axis_states(motion, route, frequency)
+    found, states = path_states(op, file, workpiece_speed, machine_file, tool_length, rate)
     with progress(f"loads along {file.name}", quiet=as_json) as share:
         loads = loads_along(op, states, engagement, bottom, share)
     rows = _summary(loads)

@@ -87,8 +87,9 @@ def _on_the_way(profile: Array, poses: Array, k: int, x: float, y: float, z: flo
 def _holds(profile: Array, poses: Array, k: int, x: float, y: float, z: float) -> bool:
     """Whether the tool holds the point at pose k or on the way to the next.
 
-    On the way the point is looked at where it comes closest to the tool axis while it is above the tip, and where it
-    comes closest to the centre of a ball; the tool is convex, so elsewhere it is no deeper in it but for a trifle.
+    On the way the point is looked at where it comes closest to the tool axis while it is above the tip, where it is
+    highest, and where it comes closest to the centre of a ball; the tool is convex, so elsewhere it is no deeper in it
+    but for a trifle.
     """
     dx, dy, dz = x - poses[0, k], y - poses[1, k], z - poses[2, k]
     ax, ay, az = poses[3, k], poses[4, k], poses[5, k]
@@ -97,9 +98,11 @@ def _holds(profile: Array, poses: Array, k: int, x: float, y: float, z: float) -
         return True
     vx, vy, vz, wx, wy, wz = poses[6, k], poses[7, k], poses[8, k], poses[9, k], poses[10, k], poses[11, k]
     after = (dx - vx) * (ax + wx) + (dy - vy) * (ay + wy) + (dz - vz) * (az + wz)
-    if h < 0.0 and after < 0.0:
-        return False
     rise = vx * ax + vy * ay + vz * az
+    if h < 0.0 and after < 0.0:  # it may come above the tip in between: its height is quadratic on the way
+        bend = vx * wx + vy * wy + vz * wz
+        t = 0.0 if bend <= 0.0 else (dx * wx + dy * wy + dz * wz - rise) / (2.0 * bend)
+        return 0.0 < t < 1.0 and _on_the_way(profile, poses, k, x, y, z, t)
     sx, sy, sz = vx - rise * ax + h * wx, vy - rise * ay + h * wy, vz - rise * az + h * wz
     square = sx * sx + sy * sy + sz * sz
     t = 0.5 if square == 0.0 else (dx * sx + dy * sy + dz * sz) / square
