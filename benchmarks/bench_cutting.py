@@ -1,4 +1,4 @@
-"""Speed of the cutting model: one revolution, compiled beside numpy, and the loads of a node.
+"""Speed of the cutting model: one revolution, compiled beside numpy, the loads of a node, engagement along a path.
 
     python benchmarks/bench_cutting.py [--json]
 
@@ -12,13 +12,18 @@ import json
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from turnmill_core.cutting.chip import prepare_cut
+from turnmill_core.cutting.engagement_map import engagement_along
 from turnmill_core.cutting.forces import revolve
 from turnmill_core.cutting.loads import cutting_loads
-from turnmill_core.operation import Conditions, Material, Operation, Tool, Workpiece
+from turnmill_core.machine.kinematics import NT3150
+from turnmill_core.machine.path_motion import axis_states, path_motion
+from turnmill_core.machine.turn_milling_paths import cut_from_operation, orthogonal_path
+from turnmill_core.operation import Conditions, Material, Operation, Shape, Tool, Workpiece
 from turnmill_core.operation_file import read_operation, shipped_operations
 
 
@@ -64,6 +69,27 @@ def measure() -> dict[str, float]:
             cutting_loads(op, op.conditions)
         result[f"{name}_loads_cpu_s"] = (time.process_time() - begin) / count
         result[f"{name}_loads_cpu_share_at_50_hz"] = 50 * result[f"{name}_loads_cpu_s"]
+    return {**result, **numeric_engagement()}
+
+
+def numeric_engagement(points: int = 1000) -> dict[str, float]:
+    """Wall and CPU time of that many maps along a turn-milling path, the workpiece updated in between [s]."""
+    result = {}
+    shapes = {"cylinder": Shape(), "ball": Shape(corner_radius=8e-3), "bull_nose": Shape(corner_radius=3e-3)}
+    for name, shape in shapes.items():
+        table = read_operation(shipped_operations()["thesis_table_3_1"])
+        op = replace(table, tool=replace(table.tool, flute_length=0.03, shape=shape),
+                     conditions=replace(table.conditions, workpiece_speed=10 * table.conditions.workpiece_speed))
+        path = orthogonal_path(cut_from_operation(op))
+        states = axis_states(path_motion(NT3150, path), path, 50.0)[:points]
+        for _ in engagement_along(op, states[:5]):  # compiles
+            pass
+        begin, cpu = time.perf_counter(), time.process_time()
+        cuts = list(engagement_along(op, states))
+        result[f"engagement_{name}_{points}_points_s"] = time.perf_counter() - begin
+        result[f"engagement_{name}_{points}_points_cpu_s"] = time.process_time() - cpu
+        rates = sorted(c.removal.total for c in cuts)
+        result[f"engagement_{name}_removal_mm3_s"] = rates[len(rates) // 2] * 1e9
     return result
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .operation import Operation
+from .operation import Operation, Shape
 from .operation_limits import NO_LIMITS, Limits
 from .operation_sensors import Sensors
 from .operation_structure_table import beam_rows, structure_rows
@@ -20,6 +20,21 @@ def _mm(length: float) -> str:
     return "no limit" if math.isinf(length) else f"{length * 1e3:.6g} mm"
 
 
+def _shape_rows(shape: Shape) -> Rows:
+    """What the tool has beyond a cylinder."""
+    lengths = [(name, getattr(shape, name.replace(" ", "_"))) for name in
+               ("corner radius", "corner radial", "corner axial", "wiper length")]
+    angles = [(name, getattr(shape, name.replace(" ", "_"))) for name in
+              ("tip angle", "taper angle", "bottom clearance")]
+    rows: Rows = [(name, _mm(value)) for name, value in lengths if value]
+    rows += [(name, f"{math.degrees(value):.6g} deg") for name, value in angles if value]
+    if shape.helix_angles:
+        rows.append(("helix angles", ", ".join(f"{math.degrees(h):.6g}" for h in shape.helix_angles) + " deg"))
+    if shape.axial_runout:
+        rows.append(("axial runout", ", ".join(f"{r * 1e6:.6g}" for r in shape.axial_runout) + " um"))
+    return rows
+
+
 def describe(op: Operation) -> list[tuple[str, Rows]]:
     """Sections of the operation, each a title and its rows of (key, value with unit)."""
     tool, bar, material, cut = op.tool, op.workpiece, op.material, op.conditions
@@ -31,8 +46,11 @@ def describe(op: Operation) -> list[tuple[str, Rows]]:
         tool_rows.append(("pitch angles", ", ".join(f"{math.degrees(p):.6g}" for p in tool.pitch_angles) + " deg"))
     if tool.runout:
         tool_rows.append(("runout", ", ".join(f"{r * 1e6:.6g}" for r in tool.runout) + " um"))
+    tool_rows += _shape_rows(tool.shape)
     size: Rows = [("diameter", _mm(bar.diameter)), ("length", _mm(bar.length))] if bar.is_bar else [
         ("length x width x height", " x ".join(_mm(d) for d in (bar.length, bar.width, bar.height)))]
+    if bar.profile:
+        size.append(("profile", ", ".join(f"{_mm(2 * r)} at {_mm(z)}" for z, r in bar.profile)))
     edge = " ".join(f"{k / 1e3:.6g}" for k in (material.Kte, material.Kre, material.Kae))
     chip = " ".join(f"{k / 1e6:.6g}" for k in (material.Ktc, material.Krc, material.Kac))
     sections = [
@@ -99,6 +117,8 @@ def _cut_rows(op: Operation) -> Rows:
     rows: Rows = [("tool speed", _rpm(cut.tool_speed))]
     if op.process == "turn-milling":
         rows += [("workpiece speed", _rpm(cut.workpiece_speed)), ("axial feed", f"{op.axial_feed * 1e3:.6g} mm/rev")]
+        rows += [("eccentricity", _mm(op.eccentricity))] if op.eccentricity else []
+        rows += [("tilt", f"{math.degrees(op.tilt):.6g} deg")] if op.tilt else []
     else:
         rows.append(("feed per tooth", _mm(op.feed_per_tooth)))
     share = cut.radial_immersion / tool.diameter * 100

@@ -42,7 +42,7 @@ def engagement_report(
 def from_above(cut: EngagementMap) -> figure:
     """The tool seen from its spindle: x_T to the right, y_T up, teeth turn clockwise; what is in the cut."""
     reach = float(cut.elements.radius.max()) * 1.1e3
-    plot = figure(title="Seen from the spindle: engaged side (outer ring by height) and bottom edges",
+    plot = figure(title="In the cut, seen from the spindle",
                   x_axis_label="x feed [mm]", y_axis_label="y cross feed [mm]", frame_width=460, frame_height=460,
                   x_range=Range1d(-reach, reach), y_range=Range1d(-reach, reach), toolbar_location="above",
                   tools="pan,box_zoom,wheel_zoom,reset,save")
