@@ -20,6 +20,7 @@ import numpy as np
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.monitoring.chatter import ChatterConfig, SpindleSpeed, initial, update
+from turnmill_core.monitoring.verdict import ChatterKind
 
 RATE = 51200.0
 CHANNELS = tuple(Channel(f"ch{k}", "displacement", "m") for k in range(5))
@@ -46,7 +47,7 @@ def items(seconds: float, rpm: float, chatter: float, axes: bool) -> Iterator[Se
         tooth = 4 * speed * t
         x = sum(np.cos(n * tooth + n) / n for n in range(1, 8))
         x = x + chatter * np.cos(2 * math.pi * 871.3 * t) * (1 + 0.4 * np.cos(tooth))
-        samples = (x[:, None] + 0.1 * rng.standard_normal((BLOCK, 5))).astype(np.float32)
+        samples = (1e-6 * (x[:, None] + 0.1 * rng.standard_normal((BLOCK, 5)))).astype(np.float32)
         yield SensorBlock(round(k * BLOCK * 1e9 / RATE), "daq", 1, k * BLOCK, RATE, CHANNELS, samples)
         for j in range(5 if axes else 0):
             yield SpindleSpeed(round((k + (j + 1) / 5) * BLOCK * 1e9 / RATE), speed)
@@ -59,13 +60,18 @@ def cost(seconds: float, rpm: float, chatter: float, axes: bool) -> tuple[float,
     state, worst = initial(config), 0.0
     for item in given[: len(given) // 4]:
         state, _ = update(config, state, item)
-    state = initial(config)
+    state, verdicts = initial(config), []
     begin = time.process_time()
     for item in given:
         since = time.perf_counter()
-        state, _ = update(config, state, item)
+        state, found = update(config, state, item)
         worst = max(worst, time.perf_counter() - since)
-    return (time.process_time() - begin) / seconds, 1e3 * worst
+        verdicts.extend(found)
+    spent = (time.process_time() - begin) / seconds
+    expected = ChatterKind.HOPF if chatter else ChatterKind.STABLE
+    if not verdicts or verdicts[-1].state is not expected:
+        raise SystemExit(f"the monitor does not say {expected.name}: nothing was measured")
+    return spent, 1e3 * worst
 
 
 def growth(seconds: float) -> float:

@@ -26,7 +26,8 @@ def heard(states: str, truth: str, scores: list[float] | None = None, **changes:
     table[:, 0] = scores or [1.5 if s in "HF" else 0.1 for s in states]
     made = Heard("chatter", 1, 4, 0.05 * count, 0.05 * (1 + np.arange(count)),
                  np.array([codes[c] for c in truth], dtype=np.int8),
-                 np.array([codes[c] for c in states], dtype=np.int8), table, None, 0.01, math.nan, np.zeros(0, dtype=np.int8))
+                 np.array([codes[c] for c in states], dtype=np.int8), table, None, 0.01, math.nan,
+                 np.zeros(0, dtype=np.int8))
     return replace(made, **changes)  # type: ignore[arg-type]
 
 

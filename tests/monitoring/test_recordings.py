@@ -51,3 +51,48 @@ def test_face_mill_chatter_with_a_nominal_speed_1_7_percent_off(recordings: Path
     hopf = [v for v in in_cut if v.state is ChatterKind.HOPF]
     assert len(hopf) > 0.9 * len(in_cut)
     assert np.median([v.tooth_passing_frequency for v in hopf]) == pytest.approx(165.6, rel=2e-3)
+
+
+def peak(x: np.ndarray, rate: float, low: float, high: float) -> float:
+    """Frequency of the strongest line between two frequencies, from one long spectrum with parabolic interpolation."""
+    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2
+    f = np.fft.rfftfreq(len(x), 1 / rate)
+    k = int(np.argmax(np.where((f > low) & (f < high), power, 0.0)))
+    a, b, c = np.log(power[k - 1: k + 2])
+    return float((k + 0.5 * (a - c) / (a - 2 * b + c)) * rate / len(x))
+
+
+def test_speed_in_chatter_agrees_with_the_spacing_of_the_lines(recordings: Path) -> None:
+    """Lines H - f_tooth and H + f_tooth of one long spectrum tell the tooth passing frequency without any comb."""
+    rate, samples = wavfile.read(recordings / "sound/chatter_1656rpm_6teeth.wav")
+    part = samples[4 * rate: 12 * rate, 0].astype(float)
+    spacing = (peak(part, rate, 1050, 1080) - peak(part, rate, 720, 748)) / 2
+    found = [v.tooth_passing_frequency for v in listen(recordings / "sound/chatter_1656rpm_6teeth.wav", 6, 1656)
+             if 4.4 < v.window_end_ns / 1e9 < 12 and v.state is ChatterKind.HOPF]
+    assert np.median(found) == pytest.approx(spacing, rel=1e-3)
+
+
+def acceleration(folder: Path, name: str, column: int) -> tuple[np.ndarray, float]:
+    table = np.genfromtxt(folder / f"acceleration/steel_x_3000rpm_{name}.csv", delimiter=",", skip_header=1)
+    return table[:, column], (len(table) - 1) / (table[-1, 0] - table[0, 0])
+
+
+@pytest.mark.parametrize("column", [1, 2])
+def test_steel_at_a_quarter_immersion_is_stable_and_its_speed_certain(recordings: Path, column: int) -> None:
+    x, rate = acceleration(recordings, "T25", column)
+    config = ChatterConfig(teeth=4, nominal_speed=3000 * 2 * math.pi / 60, expect_axes=False)
+    verdicts = watch(config, list(blocks(x, rate, size=32)))
+    assert not [v for v in verdicts if v.state in CHATTER]
+    found = [v.spindle_speed / (2 * math.pi) for v in verdicts if v.state is ChatterKind.STABLE]
+    assert len(found) > 200
+    part = x[round(rate): round(13 * rate)]
+    assert np.median(found) == pytest.approx(peak(part, rate, 390, 410) / 8, rel=1e-3)
+
+
+def test_steel_at_full_immersion_chatters_at_its_ends(recordings: Path) -> None:
+    """Between them the signal is synchronous to 0.97 at the true speed (2998.4 rpm): no chatter is said there."""
+    x, rate = acceleration(recordings, "T100", 1)
+    config = ChatterConfig(teeth=4, nominal_speed=3000 * 2 * math.pi / 60, expect_axes=False)
+    verdicts = watch(config, list(blocks(x, rate, size=32)))
+    assert [v for v in verdicts if v.state is ChatterKind.HOPF]
+    assert not [v for v in verdicts if v.state in CHATTER and 3e9 < v.window_end_ns < 12e9]
