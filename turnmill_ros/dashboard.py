@@ -7,6 +7,7 @@ in a browser and :func:`serve` runs the page's server. No ROS here.
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import os
 import subprocess
@@ -227,6 +228,7 @@ def serve(data: LiveData, port: int, address: str = "127.0.0.1") -> Callable[[],
 
     Raises OSError where the port is taken.
     """
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)  # a browser that leaves is no news
     started, outcome = threading.Event(), {}
 
     def run() -> None:
