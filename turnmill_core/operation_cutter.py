@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Literal
 
@@ -88,6 +89,7 @@ class Outline:
     wiper_start: float
 
 
+@lru_cache(maxsize=64)
 def outline(diameter: float, flute_length: float, shape: Shape) -> Outline:
     """Profile of a cutter, with the arc between cone and flank (Engin and Altintas 2001, Eq. 1-3).
 

@@ -20,6 +20,7 @@ from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.sensors import SoundModel, antialias_taps
 from turnmill_core.process.truth import principal_turns
+from turnmill_core.stability.threads import one_thread
 from turnmill_core.structure.at import plain_structures
 from turnmill_core.structure.complex_modes import checked_phases
 from turnmill_core.structure.modal import contact_modes, into_tool
@@ -87,9 +88,11 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     edge = np.array([material.Kte, material.Kre, material.Kae]) / math.cos(tool.helix_angle)
     depths = [op.conditions.depth, *(p.depth for p in op.schedule)]
     lag = abs(lag_per_depth) * max(0.0, *depths)
+    with one_thread():
+        modes = _modes(op, config.sound, dt)
     speeds = [s for s in (op.conditions.tool_speed, *(p.tool_speed for p in op.schedule)) if s > 0]
     return ProcessModel(
-        op=op, dt=dt, modes=_modes(op, config.sound, dt),
+        op=op, dt=dt, modes=modes,
         tooth_angle=np.concatenate([[0.0], np.cumsum(pitch)[:-1]]), pitch=pitch,
         runout=np.array(tool.runout or (0.0,) * tool.teeth),
         shape=np.array([tool.radius, op.workpiece.radius if op.process == "turn-milling" else 0.0, lag_per_depth,

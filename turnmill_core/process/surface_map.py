@@ -141,8 +141,7 @@ def _lowest(
 def bottom_of(op: Operation) -> tuple[Floats, float]:
     """Bottom edge of the tool as the kernel wants it (see _kernels.envelope), and the radius [m] that it reaches to."""
     tool = op.tool
-    depth = max(op.conditions.depth, 1e-6)
-    shape = outline(tool.diameter, tool.flute_length if math.isfinite(tool.flute_length) else 100 * depth, tool.shape)
+    shape = outline(tool.diameter, tool.flute_length, tool.shape)
     bottom = np.array([shape.wiper_start, math.tan(tool.shape.bottom_clearance), shape.tip_end[0],
                        math.tan(tool.shape.tip_angle), *shape.centre, tool.shape.corner_radius])
     return bottom, shape.tip_end[0] if tool.shape.corner_radius == 0 else shape.centre[0] + tool.shape.corner_radius
