@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -91,8 +90,6 @@ class LobeProcess:
 
 def _compute(sender: Connection, request: LobeRequest) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the node ends this process
-    if hasattr(os, "nice"):
-        os.nice(10)
     op = request.op
     speeds = op.conditions.tool_speed * np.linspace(0.7, 1.3, request.points)
     depths = np.linspace(0.0, searched_depth(op, request.cut), DEPTHS + 1)[1:]

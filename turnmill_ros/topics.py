@@ -71,7 +71,7 @@ CHATTER_STATE = Topic(
     "chatter_state", "turnmill_msgs/msg/ChatterState", "output", 100, 20.0,
     "verdict on one window of the sensor signal")
 STABILITY_MARGIN = Topic(
-    "stability_margin", "turnmill_msgs/msg/StabilityMargin", "output", 100, 5.0,
+    "stability_margin", "turnmill_msgs/msg/StabilityMargin", "output", 100, 10.0,
     "predicted distance of the present cut from chatter")
 STABILITY_LOBES = Topic(
     "stability_lobes", "turnmill_msgs/msg/StabilityLobes", "output", 1, 0.0,

@@ -27,7 +27,7 @@ from turnmill_ros.predicted import CHANGE, Cut, grid
 
 LOBE_CHANGE = 0.02
 """Relative change of workpiece speed, natural frequencies or compliance that asks for another diagram."""
-BUSY = 0.5
+BUSY = 0.8
 """Share of the time that margins may take; slower ones come less often."""
 
 
