@@ -51,7 +51,7 @@ class Stock:
 class SweptWorkpiece:
     """Stock and the poses that the tool has passed; a value, renewed by `swept_by`.
 
-    profile (13,): the cutter's shape for the kernels; spacing [m]: distance between poses; blocks: poses (12, n), tip,
+    profile (14,): the cutter's shape for the kernels; spacing [m]: distance between poses; blocks: poses (12, n), tip,
     axis and their change to the next, in order; last: axis state up to which the poses go (None: no motion yet).
     """
 
@@ -68,7 +68,7 @@ class SweptWorkpiece:
 
 
 def profile_of(tool: Tool, spacing: float) -> Array:
-    """Shape of the tool as the kernels take it (13,), see _kernels/sweep.py.
+    """Shape of the tool as the kernels take it (14,), see _kernels/sweep.py.
 
     `spacing` [m]: largest distance from a pose to the next.
     """
@@ -79,7 +79,8 @@ def profile_of(tool: Tool, spacing: float) -> Array:
     return read_only((
         math.tan(shape.tip_angle), line.tip_end[1], *line.centre, shape.corner_radius**2, line.corner_end[1],
         line.flank_foot, math.tan(shape.taper_angle), line.top[1], line.wiper_start, math.tan(shape.bottom_clearance),
-        (widest + spacing) ** 2, spacing))
+        (widest + spacing) ** 2, spacing,
+        1.0 if shape.corner_radius > 0 and line.centre[0] < 1e-12 else 0.0))
 
 
 def stock_of(op: Operation) -> Stock:

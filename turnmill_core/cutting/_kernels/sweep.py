@@ -23,9 +23,10 @@ TIGHT = 1e-9
 BLOCK = 32
 """Poses that are looked at together."""
 
-# places in a profile; slopes are tangents, WIDEST is squared and a STEP, the longest way to a next pose, too wide
+# places in a profile; slopes are tangents, WIDEST is squared and a STEP, the longest way to a next pose, too wide;
+# BALL is 1 where the tool ends in one, otherwise 0
 (TIP_SLOPE, TIP_END, CENTRE_RADIUS, CENTRE_HEIGHT, CORNER_SQUARE, CORNER_END, FOOT, TAPER_SLOPE, TOP, WIPER, DISH_SLOPE,
- WIDEST, STEP) = range(13)
+ WIDEST, STEP, BALL) = range(14)
 
 
 @njit(cache=True)
@@ -128,6 +129,7 @@ def covered_by(profile: Array, poses: Array, x: float, y: float, z: float, hint:
         return hint
     tip_x, tip_y, tip_z, axis_x, axis_y, axis_z = poses[0], poses[1], poses[2], poses[3], poses[4], poses[5]
     lowest, highest, widest = -profile[STEP], profile[TOP], profile[WIDEST]
+    centre, ball = profile[CENTRE_HEIGHT], profile[BALL]
     n = poses.shape[1]
     for first in range(0, n, BLOCK):
         last = min(first + BLOCK, n)
@@ -135,13 +137,15 @@ def covered_by(profile: Array, poses: Array, x: float, y: float, z: float, hint:
         for k in range(first, last):  # without branches, so that it is vectorized
             dx, dy, dz = x - tip_x[k], y - tip_y[k], z - tip_z[k]
             h = dx * axis_x[k] + dy * axis_y[k] + dz * axis_z[k]
-            square = dx * dx + dy * dy + dz * dz - h * h
+            below = min(h - centre, 0.0)
+            square = dx * dx + dy * dy + dz * dz - h * h + ball * below * below
             candidates += (square < widest) & (h > lowest) & (h <= highest)
         if candidates > 0:
             for k in range(first, last):
                 dx, dy, dz = x - tip_x[k], y - tip_y[k], z - tip_z[k]
                 h = dx * axis_x[k] + dy * axis_y[k] + dz * axis_z[k]
-                if h <= lowest or dx * dx + dy * dy + dz * dz - h * h >= widest:
+                below = min(h - centre, 0.0)
+                if h <= lowest or dx * dx + dy * dy + dz * dz - h * h + ball * below * below >= widest:
                     continue
                 if _holds(profile, poses, k, x, y, z):
                     return k
