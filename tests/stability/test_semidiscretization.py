@@ -8,9 +8,10 @@ import pytest
 from tests.stability.cases import PUBLISHED, textbook
 from turnmill_core.operation import RIGID, Mode, Structure
 from turnmill_core.prediction import PredictedType
-from turnmill_core.stability.floquet import classify, verdict_from_map
+from turnmill_core.stability import collocation, zero_order
+from turnmill_core.stability.floquet import classify
 from turnmill_core.stability.problem import StabilityProblem, constant_engagement, directional_matrix
-from turnmill_core.stability.semidiscretization import default_steps, leading_multiplier, period_map
+from turnmill_core.stability.semidiscretization import default_steps, leading_multiplier, period_map, solve
 from turnmill_core.structure.modal import frf, modal_model, state_space
 
 
@@ -118,7 +119,7 @@ def test_flip_at_low_immersion_and_hopf_beside_it() -> None:
 
 def test_flip_verdict_has_half_order_lines() -> None:
     problem = textbook(2.5e-3, rpm=18000, start=np.pi - np.arccos(1 - 0.1), exit=np.pi)
-    found = verdict_from_map(*(lambda m: (m.matrix, m.displacement, m.period))(period_map(problem, 80)))
+    found = solve(problem, 80)
     assert found.predicted_type is PredictedType.FLIP
     tooth = 2 * 18000 / 60
     assert found.chatter_frequency / tooth % 1 == pytest.approx(0.5, abs=1e-9)
@@ -144,3 +145,14 @@ def test_a_delay_shorter_than_a_step_is_refused() -> None:
 
 def test_default_resolution_follows_the_fastest_mode() -> None:
     assert default_steps(textbook(1e-3, rpm=500)) > 8 * default_steps(textbook(1e-3, rpm=5000))
+
+
+def test_three_methods_give_one_kind_of_verdict() -> None:
+    """Where all three are exact they agree: four straight teeth in a slot."""
+    problem = textbook(0.3e-3, rpm=7000, teeth=4, axes=2)
+    found = [solve(problem, 400), collocation.solve(problem), zero_order.solve(problem)]
+    for verdict in found:
+        assert verdict.spectral_radius == pytest.approx(found[1].spectral_radius, abs=1e-3)
+        assert verdict.predicted_type is PredictedType.HOPF
+        assert verdict.chatter_frequency == pytest.approx(found[1].chatter_frequency, abs=0.2)
+        assert verdict.period == problem.period

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from turnmill_core.stability.floquet import FloquetVerdict, verdict_from_map
 from turnmill_core.stability.problem import StabilityProblem, contact_basis, frame_matrix, mean_directional_matrices
 from turnmill_core.stability.threads import one_thread
 
@@ -70,6 +71,12 @@ def in_fixed_frame(problem: StabilityProblem, observed: NDArray[Any]) -> NDArray
         T = frame_matrix(problem.tool_speed * problem.period / max(k, 1) * np.arange(k))
         observed[:, :2] = T @ observed[:, :2]
     return observed
+
+
+def solve(problem: StabilityProblem, steps: int | None = None, order: int = 1) -> FloquetVerdict:
+    """Verdict of one problem; arguments and errors as in period_map."""
+    found = period_map(problem, steps, order)
+    return verdict_from_map(found.matrix, found.displacement, found.period)
 
 
 def leading_multiplier(problem: StabilityProblem, steps: int | None = None, order: int = 1) -> complex:
