@@ -55,7 +55,8 @@ class SpeedSource(IntEnum):
 class Verdict:
     """Verdict on one window; the fields of turnmill_msgs/ChatterState.
 
-    Times in ns, frequencies in Hz, spindle_speed in rad/s; NaN where a value does not exist.
+    Times in ns, frequencies in Hz, spindle_speed in rad/s; spindle_speed_confidence: share of the first (at most
+    twelve) tooth passing harmonics that stand out of the noise at that speed. NaN where a value does not exist.
     """
 
     window_start_ns: int

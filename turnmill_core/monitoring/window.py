@@ -196,6 +196,7 @@ def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judg
         tooth_passing_frequency=config.teeth * f.frequency, spindle_speed=2 * math.pi * f.frequency,
         spindle_speed_source=SpeedSource.REFINED if f.comb >= 2 else blank.spindle_speed_source,
         asynchronous_ratio=judgement.asynchronous_ratio, half_order_ratio=judgement.half_order_ratio,
+        spindle_speed_confidence=f.comb / f.comb_of if f.comb_of else 0.0,
     )
 
 
