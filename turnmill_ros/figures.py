@@ -164,21 +164,3 @@ def lines_over_time(title: str, unit: str, time: Sequence[float], named: dict[st
     if named:
         legend_right(plot)
     return plot
-
-
-def lobes(tool_speeds_rpm: NDArray[np.float64], limit_mm: NDArray[np.float64], at: tuple[float, float] | None,
-          title: str) -> figure:
-    """Stability limit [mm] over tool speed [rpm], with the operating point `at` (rpm, mm)."""
-    plot = new_figure(title, "tool speed [rpm]", "axial depth of cut [mm]", 320)
-    top = float(np.max(limit_mm)) * 1.1
-    plot.varea(x=tool_speeds_rpm, y1=limit_mm, y2=np.full_like(limit_mm, top), color=LINE_COLOURS[1], alpha=0.25,
-               legend_label="chatter")
-    plot.varea(x=tool_speeds_rpm, y1=np.zeros_like(limit_mm), y2=limit_mm, color=LINE_COLOURS[2], alpha=0.25,
-               legend_label="stable")
-    plot.line(tool_speeds_rpm, limit_mm, color="#000000", line_width=2, legend_label="stability limit")
-    if at is not None:
-        plot.scatter([at[0]], [at[1]], size=13, marker="star", color=LINE_COLOURS[0], line_color="#000000",
-                     legend_label="operating point")
-    plot.y_range = Range1d(0, top)
-    legend_right(plot)
-    return plot

@@ -61,7 +61,7 @@ def discrete_delay(
     literal: the mark of the present tooth is (y, R_w cos theta), the turned one R_w (sin theta', cos theta') with
     tan(theta) = y / (R_w - a) (Eq. 4.81-4.83); since y is not R_w sin(theta), alpha ripples (erratum D1). Else both
     marks lie on the bar, and alpha is the bar's rotation.
-    pitch [rad], speeds [rad/s], radii and depth a [m].
+    pitch [rad]; tool_speed, workpiece_speed [rad/s]; tool_radius R_t, workpiece_radius R_w, depth a [m].
     """
     period = tooth_period(pitch, tool_speed)
     if not 0 <= depth < workpiece_radius:
@@ -122,8 +122,9 @@ def delay_curve(
 ) -> Floats:
     """Delay [s] of one tooth at each `angle` (k,) [rad] by any of DELAY_CURVES.
 
-    pitch [rad], speeds [rad/s], radii and depth of cut [m]; the first-principles models take the surface speed at half
-    the depth. Raises ``ValueError`` for an unknown model and as the models do.
+    pitch [rad]; tool_speed, workpiece_speed [rad/s]; tool_radius, workpiece_radius, depth of cut [m]. The
+    first-principles models take the surface speed at half the depth. Raises ``ValueError`` for an unknown model and as
+    the models do.
     """
     at = np.asarray(angle, dtype=np.float64)
     if model == "milling":
@@ -145,7 +146,8 @@ def delay_statistics(
 ) -> tuple[float, float]:
     """Mean over `angle` in tooth periods [1] and (largest - smallest) / mean [1] of delay_curve.
 
-    Both NaN where the model does not hold: a bar thinner than the cut, a surface as fast as the edge.
+    pitch [rad]; tool_speed, workpiece_speed [rad/s]; tool_radius, workpiece_radius, depth of cut [m]. Both NaN where
+    the model does not hold: a bar thinner than the cut, a surface as fast as the edge.
     """
     try:
         curve = delay_curve(model, pitch, tool_speed, workpiece_speed, tool_radius, workpiece_radius, depth, angle)

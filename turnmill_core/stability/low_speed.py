@@ -80,8 +80,9 @@ def average_envelope(
     """Envelope of a tool with one mode alike in x and y, by the mean matrices (Eq. 4.117, 4.119).
 
     At the worst phase of the past the cut feeds in a N Ktc / 2 pi (|lambda_c| + Im lambda_c), against structural
-    damping 2 zeta m w_n and the flank's a N arc K_rp / (4 pi V), K_rp = K_sp L_w^2 / 2 [N/m]. coefficients (Ktc, Krc)
-    [Pa]; arc [rad]; flank: None or without indentation gives an asymptotic speed of 0. Light damping is taken.
+    damping 2 zeta m w_n and the flank's a N arc K_rp / (4 pi V), K_rp = K_sp L_w^2 / 2 [N/m]. tool_radius [m];
+    coefficients (Ktc, Krc) [Pa]; arc [rad]; flank: None or without indentation gives an asymptotic speed of
+    0. Light damping is taken.
     """
     Ktc, Krc = coefficients
     eigenvalue = mean_eigenvalue(Krc / Ktc, arc)

@@ -65,7 +65,10 @@ def period_map(problem: StabilityProblem, steps: int | None = None, order: int =
 
 
 def in_fixed_frame(problem: StabilityProblem, observed: NDArray[Any]) -> NDArray[Any]:
-    """Displacements (k, 2 or 3, L) at equally spaced times of a period, turned back where the problem's frame turns."""
+    """Displacements `observed` (k, 2 or 3, L) at equally spaced times of a period, turned back.
+
+    Unchanged where the problem's frame does not turn.
+    """
     if problem.rotating:
         k = len(observed)
         T = frame_matrix(problem.tool_speed * problem.period / max(k, 1) * np.arange(k))
