@@ -120,7 +120,8 @@ def test_arcs_are_those_of_a_swept_point_cloud(kind: str, b: float, y: float) ->
             mine = turned[(turned > s - 4 * DEG) & (turned < e + 4 * DEG)]
             assert mine.min() == pytest.approx(s, abs=0.5 * DEG)
             assert mine.max() == pytest.approx(e, abs=0.5 * DEG)
-        covered = sum(((s + (angles - s) % (2 * math.pi)) < e + 0.5 * DEG).sum() for s, e in arcs)
+        near = 0.5 * DEG
+        covered = sum(((angles - s + near) % (2 * math.pi) < e - s + 2 * near).sum() for s, e in arcs)
         assert covered >= 0.98 * len(angles)
 
 
