@@ -109,11 +109,11 @@ def _judged(problem: StabilityProblem) -> StabilityPoint:
 
 
 def searched_depth(op: Operation, conditions: Conditions) -> float:
-    """Default largest depth [m] of a search: four times the nominal or present depth, within tool and workpiece."""
-    nominal = max(op.conditions.depth, conditions.depth)
-    largest = 4 * nominal if nominal > 0 else op.tool.radius
+    """Default largest depth [m] of a search: four times the nominal or twice the present depth, within tool and
+    workpiece; without either the tool radius."""
+    largest = max(4 * op.conditions.depth, 2 * conditions.depth)
     bounds = [op.tool.flute_length, 0.95 * op.workpiece.radius if op.workpiece.is_bar else op.workpiece.height]
-    return min(largest, *bounds)
+    return min(largest if largest > 0 else op.tool.radius, *bounds)
 
 
 def stability_margin(

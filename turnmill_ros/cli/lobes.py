@@ -46,7 +46,7 @@ def lobes(
         metavar="FROM..TO", help="Tool speeds of the diagram, e.g. 2000rpm..6000rpm [default: half to 1.5 x]."
     )] = None,
     deepest: Annotated[str | None, typer.Option(
-        metavar="QUANTITY", help="Largest depth of the diagram [default: four times the depth]."
+        metavar="QUANTITY", help="Largest depth of the diagram [default: 4 x the nominal depth]."
     )] = None,
     workpiece_speeds: Annotated[str | None, typer.Option(
         metavar="A,B,... or FROM..TO", help="A diagram for each, e.g. 6rpm,21rpm or 2rpm..40rpm [default: one]."
