@@ -41,8 +41,8 @@ LARGEST_SPREAD = 0.1
 FEWEST_REVOLUTIONS = 6
 SCORE_MEMORY = 0.9
 
-LOOK_EVERY = 1
-"""A wrong tachometer is looked for in every fourth window (windows overlap by three quarters or more)."""
+LOOK_EVERY = 4
+"""While chatter is held, a wrong tachometer is looked for in every fourth window (they overlap by three quarters)."""
 
 SURE = 5
 """Calm windows after which the ratio of true to measured speed is no longer sought far away."""
@@ -116,6 +116,8 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     steady = turned.spread < 1e-5
     turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
         turned.turns, len(p.samples), p.rate / rate)
+    grid_index = (blank.last_sample + 1) // max(1, round(config.hop * rate))
+    look = tracker.calm < SURE and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)
     scores, ratio = tracker.scores, tracker.ratio
     if blank.spindle_speed_source is SpeedSource.NOMINAL:
         grid = ratio_grid(config.nominal_band)
@@ -125,12 +127,12 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
         middle = ratio
     else:
         middle = tracker.middle
-        if steady and tracker.calm < SURE and (blank.last_sample + 1) // round(config.hop * rate) % LOOK_EVERY == 0:
+        if steady and look:
             tooth_frequency = config.principal_teeth * turned.mean / (2 * math.pi)
             middle = overruled(spectrum(p.samples, p.rate, p.top), tooth_frequency, ratio_grid(config.nominal_band),
                                middle, config.axis_band)
     told = min(config.nominal_band, PULL / (config.principal_teeth * float(turns[-1] - turns[0])))
-    wide = (middle - told, middle + told) if tracker.calm < SURE and told > config.axis_band else None
+    wide = (middle - told, middle + told) if look and told > config.axis_band else None
     band = (middle - config.axis_band, middle + config.axis_band)
     ratio = min(band[1], max(band[0], ratio))
     f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide)
