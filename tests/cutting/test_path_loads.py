@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from turnmill_core.cutting.chip import ChipModel
 from turnmill_core.cutting.cutter import cutter_elements
 from turnmill_core.cutting.engagement_map import EngagementMap, engagement_along, engagement_map
 from turnmill_core.cutting.feed import feed_at
@@ -183,6 +184,18 @@ def test_clearance_leaves_the_bottom_to_the_wiper() -> None:
         if wiper == 2.0:
             assert cut.removal.bottom == pytest.approx(base.bottom, rel=1e-3)
             assert not cut.arcs.angle[cut.elements.bottom & (cut.elements.radius < 5.9 * MM)].any()
+
+
+def test_a_wiper_as_long_as_the_feed_has_the_bottom_forces_of_a_flat_tool() -> None:
+    """With either chip; the rest of the dished bottom is out of the cut, and so are its edge forces."""
+    flat, dished = operation(Shape()), operation(Shape(bottom_clearance=0.1, wiper_length=2 * MM))
+    chips: tuple[ChipModel, ...] = ("static", "exact")
+    for chip in chips:
+        a, b = (cutting_loads(op, op.conditions, chip=chip, bottom=True) for op in (flat, dished))
+        assert b.force_tool_mean == pytest.approx(a.force_tool_mean, rel=0.03, abs=1.5)
+        side = cutting_loads(dished, dished.conditions, chip=chip)
+        assert side.force_tool_mean == pytest.approx(cutting_loads(flat, flat.conditions, chip=chip).force_tool_mean)
+        assert b.force_tool_mean[2] > side.force_tool_mean[2]
 
 
 def test_axial_runout_is_felt_at_the_bottom_of_a_ball() -> None:

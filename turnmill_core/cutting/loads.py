@@ -87,14 +87,18 @@ def cutting_loads(
     Raises:
         ValueError: the depth exceeds the flute length, or an exact chip is asked for where there is none.
     """
-    if not _has_closed_form(op, bottom):
+    if not _has_closed_form(op):
         return path_loads(op, steady_map(op, conditions, elements), angles, chip, bottom)
     cut = prepare_cut(op, conditions, elements) if conditions.in_cut else None
     arcs = cut.engagement if cut else Engagement(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 2)))
     turns = []
     if cut and arcs.angle.any():
         turns.append(_turn(op, cut, angles, chip))
-        if bottom:
+        if bottom and op.tool.shape != CYLINDER:  # dish, wiper or axial runout
+            below_map = steady_map(op, conditions)
+            if below_map.arcs.angle[below_map.elements.bottom].any():
+                turns.append(_turn(op, part_of(op, below_map, below_map.elements.bottom), angles, "static"))
+        elif bottom:
             below = bottom_loads(op, conditions, angles * _FINER)
             turns.append(_Turn(below.force_tool, below.tool_torque, below.workpiece_torque,
                                below.force_tool.mean(axis=0), float(below.tool_torque.mean()),
@@ -158,10 +162,8 @@ def part_of(op: Operation, cut: EngagementMap, part: NDArray[np.bool_]) -> Cut:
 _NOTHING = Removal(0.0, 0.0, 0.0)
 
 
-def _has_closed_form(op: Operation, bottom: bool) -> bool:
-    shape = op.tool.shape
-    flat = shape == CYLINDER or not (bottom or shape.axial_runout)
-    return shape.is_cylinder and flat and op.eccentricity == 0 and op.tilt == 0
+def _has_closed_form(op: Operation) -> bool:
+    return op.tool.shape.is_cylinder and op.eccentricity == 0 and op.tilt == 0
 
 
 @dataclass(frozen=True)
