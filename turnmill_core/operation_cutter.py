@@ -93,7 +93,8 @@ class Outline:
 def outline(diameter: float, flute_length: float, shape: Shape) -> Outline:
     """Profile of a cutter, with the arc between cone and flank (Engin and Altintas 2001, Eq. 1-3).
 
-    `diameter` [m] is measured where the lines of tip cone and flank meet, as in the APT definition.
+    `diameter` [m] is measured where the lines of tip cone and flank meet, as in the APT definition; `flute_length` [m]
+    is the tool's height, which may be infinite.
 
     Raises:
         ValueError: the parameters do not make a tool: the arc does not meet cone or flank, the parts
