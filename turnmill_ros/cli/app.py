@@ -12,26 +12,24 @@ from collections.abc import Callable
 import typer
 from rich.console import Console
 
-from turnmill_ros.cli import (
-    chuck,
-    delay,
-    detect_bench,
-    engagement,
-    forces,
-    identify,
-    lobes,
-    model,
-    modes,
-    online,
-    plan,
-    positions,
-    recordings,
-    stability,
-    surface,
-    toolpath,
-    vibration,
-    workpiece,
-)
+from turnmill_ros.cli.chuck import chuck
+from turnmill_ros.cli.delay import delay
+from turnmill_ros.cli.detect_bench import detect_bench
+from turnmill_ros.cli.engagement import engagement
+from turnmill_ros.cli.forces import forces
+from turnmill_ros.cli.identify import identify
+from turnmill_ros.cli.lobes import lobes
+from turnmill_ros.cli.modes import modes
+from turnmill_ros.cli.online import doctor, live, replay
+from turnmill_ros.cli.operation import operation
+from turnmill_ros.cli.plan import plan
+from turnmill_ros.cli.positions import positions
+from turnmill_ros.cli.recordings import analyze_bags, import_recording, recover, simulate
+from turnmill_ros.cli.stability import stability
+from turnmill_ros.cli.surface import surface
+from turnmill_ros.cli.toolpath import toolpath
+from turnmill_ros.cli.vibration import vibration
+from turnmill_ros.cli.workpiece import workpiece
 from turnmill_ros.errors import InputError
 
 # The base of typer's usage errors; newer ones carry their own click.
@@ -42,11 +40,21 @@ app = typer.Typer(
     help="In-process monitoring of milling and turn-milling: forces, stability, chatter from recordings and live.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
 )
-for module in (
-    model, forces, engagement, identify, modes, vibration, surface, stability, lobes, delay, recordings, online,
-    toolpath, plan, positions, workpiece, chuck, detect_bench,
-):
-    module.register(app)
+PANELS: dict[str, dict[str, Callable[..., None]]] = {
+    "Start": {"operation": operation, "doctor": doctor},
+    "Recordings and the live twin": {
+        "replay": replay, "live": live, "analyze": analyze_bags, "simulate": simulate, "import": import_recording,
+        "recover": recover, "detect-bench": detect_bench},
+    "Mechanics": {"forces": forces, "engagement": engagement, "toolpath": toolpath, "identify": identify},
+    "Structures": {"modes": modes, "positions": positions, "workpiece": workpiece, "chuck": chuck},
+    "Stability": {"stability": stability, "lobes": lobes, "delay": delay},
+    "Vibration, surface and planning": {"vibration": vibration, "surface": surface, "plan": plan},
+}
+"""Every command by the panel of ``turnmill --help`` that it stands in."""
+
+for panel, commands in PANELS.items():
+    for command_name, function in commands.items():
+        app.command(command_name, rich_help_panel=panel)(function)
 
 
 def main() -> None:

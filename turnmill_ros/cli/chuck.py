@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from turnmill_core.operation_structure import Chuck
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(chuck)
-
-
 def chuck(
     file: Annotated[Path, typer.Argument(
         metavar="FRF", help="Table: frequency [Hz], 11 real [m/N], 11 imag [m/N], 12 ..., 22 ... of the dummy.")],

@@ -23,11 +23,6 @@ DIAMETER_RATIOS = np.geomspace(1.2, 20.0, 120)
 HEADER = ("model", "mean [ms]", "smallest [ms]", "largest [ms]", "mean / tooth period")
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(delay)
-
-
 def delay(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None,

@@ -11,11 +11,6 @@ import typer
 from turnmill_ros.cli.output import JsonFlag, console, new_file, print_json, progress, table, whole
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command("detect-bench")(detect_bench)
-
-
 def detect_bench(
     quick: Annotated[bool, typer.Option("--quick", help="A few cuts, no hours of quiet signal.")] = False,
     hours: Annotated[float | None, typer.Option(

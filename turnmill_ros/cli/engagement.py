@@ -21,11 +21,6 @@ HEIGHTS, ALONG = ("part", "height [mm]", "radius [mm]", "arcs [deg]"), (
     "time [s]", "contact up to [mm]", "widest arc [deg]", "side [mm3/s]", "bottom [mm3/s]")
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(engagement)
-
-
 def engagement(
     op_name: Annotated[str, typer.Argument(metavar="OP", help="Operation file (YAML), or the name of a shipped one.")],
     tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None, depth: Depth = None,

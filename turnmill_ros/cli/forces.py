@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from turnmill_core.operation import Conditions, Operation
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(forces)
-
-
 def forces(
     op_name: Annotated[str | None, typer.Argument(
         metavar="OP", help="Operation file (YAML), or the name of a shipped one; not needed with --compare.")] = None,

@@ -25,11 +25,6 @@ UNITS = {"c": ("MPa", 1e-6), "e": ("N/mm", 1e-3)}
 """Unit and scale of a coefficient by the last letter of its name."""
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(identify)
-
-
 def identify(
     file: Annotated[Path, typer.Argument(
         metavar="TABLE", help="Table of tests, one a row: feed, depth, engagement, mean Fx, Fy, Fz; units in the "

@@ -21,6 +21,7 @@ from turnmill_ros.cli.output import (
     progress,
     quantity,
     table,
+    values,
     whole,
 )
 from turnmill_ros.cli.stability import Delay, DelayOption
@@ -32,11 +33,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Kind = Literal["map", "boundary"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(lobes)
 
 
 def lobes(
@@ -76,7 +72,7 @@ def lobes(
     html, image, sheet = (None if p is None else new_file(p) for p in (report, png, csv))
     op, cut = asked(op_name, changes, tool_speed, workpiece_speed, depth)
     n, m, k = _points(points)
-    speeds = _range(tool_speeds, "--tool-speeds", n) if tool_speeds is not None else (
+    speeds = _speeds(tool_speeds, "--tool-speeds", n, least=2) if tool_speeds is not None else (
         np.linspace(0.5, 1.5, n) * op.conditions.tool_speed)
     found = _computed(op, cut, speeds, _workpiece_speeds(workpiece_speeds, k, cut),
                       quantity(deepest, "m", "--deepest"), m, kind, low_speed, delay, as_json)
@@ -158,23 +154,14 @@ def _points(text: str) -> tuple[int, int, int]:
     return n, m, k
 
 
-def _range(text: str, option: str, count: int) -> Floats:
-    """`count` equally spaced values of FROM..TO, SI."""
-    low, dots, high = text.partition("..")
-    if not dots:
-        raise InputError(option, value=text, expected="FROM..TO with units, such as 2000rpm..6000rpm")
-    ends = [quantity(end, "rad/s", option) for end in (low, high)]
-    assert ends[0] is not None
-    assert ends[1] is not None
-    if not 0 < ends[0] < ends[1]:
-        raise InputError(option, value=text, expected="two speeds > 0, the second above the first")
-    return np.linspace(ends[0], ends[1], count)
+def _speeds(text: str, option: str, count: int, least: int = 1) -> Floats:
+    """Speeds asked for [rad/s], ascending: a list, or a range with `count` values unless it says how many."""
+    found = np.unique(values(text, "rad/s", option, count))
+    if found[0] <= 0 or len(found) < least:
+        raise InputError(option, value=text, expected="FROM..TO or A,B,...: speeds > 0" + ", two or more" * (least > 1))
+    return found
 
 
 def _workpiece_speeds(text: str | None, count: int, cut: Conditions) -> Floats:
     """The workpiece speeds asked for [rad/s], ascending: one, a list or a range."""
-    if text is None:
-        return np.array([cut.workpiece_speed])
-    if ".." in text:
-        return _range(text, "--workpiece-speeds", count)
-    return np.unique([quantity(part, "rad/s", "--workpiece-speeds") or 0.0 for part in text.split(",")])
+    return np.array([cut.workpiece_speed]) if text is None else _speeds(text, "--workpiece-speeds", count)

@@ -20,11 +20,6 @@ COMPLEX = math.radians(15)
 """Phase [rad] of a residue from which the table calls a mode complex."""
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(modes)
-
-
 def modes(
     file: Annotated[Path, typer.Argument(
         metavar="FRF", help="Universal file (.uff), or a table: frequency [Hz], xx real [m/N], xx imag [m/N], ...")],

@@ -31,13 +31,6 @@ if TYPE_CHECKING:
     from turnmill_ros.graph import GraphResult
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands of this module to `app`."""
-    app.command()(doctor)
-    app.command()(replay)
-    app.command()(live)
-
-
 def doctor(as_json: JsonFlag = False) -> None:
     """Check ROS, middleware, messages, domain and disk; exit code 1 where something is missing.
 

@@ -53,6 +53,22 @@ def span(text: str, unit: str, option: str) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
+def values(text: str, unit: str, option: str, count: int | None = None) -> list[float]:
+    """SI values of ``A,B,...`` as they stand, or of ``FROM..TO:COUNT``, equally spaced; COUNT defaults to `count`."""
+    if ".." not in text:
+        return [value for part in text.split(",") if (value := quantity(part.strip(), unit, option)) is not None]
+    ends, colon, number = text.partition(":")
+    if colon and not (number.strip().isdigit() and 2 <= int(number) <= 4000):
+        raise InputError(option, value=text, expected="FROM..TO:COUNT with a count of 2 to 4000")
+    points = int(number) if colon else count
+    if points is None:
+        raise InputError(option, value=text, expected="how many: FROM..TO:COUNT")
+    low, high = span(ends, unit, option)
+    if not low < high:
+        raise InputError(option, value=text, expected="TO above FROM")
+    return [float(value) for value in np.linspace(low, high, points)]
+
+
 def whole(value: int, option: str, low: int, high: int | None = None) -> int:
     """Check that a whole number of the command line lies within its bounds; return it."""
     if value < low or (high is not None and value > high):

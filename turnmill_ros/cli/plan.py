@@ -19,6 +19,7 @@ from turnmill_ros.cli.output import (
     progress,
     quantity,
     table,
+    values,
     whole,
 )
 from turnmill_ros.errors import InputError
@@ -28,19 +29,14 @@ if TYPE_CHECKING:
     from turnmill_core.process.plan import Choice, Grid, Plan
 
 RPM = 60 / (2 * math.pi)
-HELP = "Values as A,B,... or FIRST:LAST:COUNT, each with its unit"
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(plan)
+HELP = "Values as A,B,... or FROM..TO:COUNT, each with its unit"
 
 
 def plan(
     op_name: OperationArgument,
-    workpiece_speeds: Annotated[str | None, typer.Option(metavar="RANGE", help=f"{HELP}: 10rpm:50rpm:5.")] = None,
-    tool_speeds: Annotated[str | None, typer.Option(metavar="RANGE", help="e.g. 1000rpm:12000rpm:200.")] = None,
-    depths: Annotated[str | None, typer.Option(metavar="RANGE", help="e.g. 0.1mm:6mm:60.")] = None,
+    workpiece_speeds: Annotated[str | None, typer.Option(metavar="RANGE", help=f"{HELP}: 10rpm..50rpm:5.")] = None,
+    tool_speeds: Annotated[str | None, typer.Option(metavar="RANGE", help="e.g. 1000rpm..12000rpm:200.")] = None,
+    depths: Annotated[str | None, typer.Option(metavar="RANGE", help="e.g. 0.1mm..6mm:60.")] = None,
     feeds: Annotated[str | None, typer.Option(
         metavar="RANGE", help="Axial feeds (milling: per tooth), e.g. 6mm/rev,8mm/rev.")] = None,
     samples: Annotated[int, typer.Option(help="Draws of modes and coefficients for a robust choice; 0: none.")] = 40,
@@ -53,7 +49,7 @@ def plan(
 ) -> None:
     """The most productive cut within all limits: speeds, depth and feed; which limit binds where. Ctrl-C ends it.
 
-    Example: turnmill plan thesis_table_5_1 --workpiece-speeds 10rpm:60rpm:6 --report plan.html --write best.yaml
+    Example: turnmill plan thesis_table_5_1 --workpiece-speeds 10rpm..60rpm:6 --report plan.html --write best.yaml
     """
     from turnmill_core.process.plan import plan as make_plan
     from turnmill_core.process.robust import draw, feasible_share, robust_choice
@@ -101,27 +97,18 @@ def _grid(op: Operation, tool: str | None, workpiece: str | None, depths: str | 
     from turnmill_core.process.plan import default_grid
 
     given = {
-        "tool_speeds": _range(tool, "rad/s", "--tool-speeds"),
-        "workpiece_speeds": _range(workpiece, "rad/s", "--workpiece-speeds"),
-        "depths": _range(depths, "m", "--depths"),
-        "feeds": _range(feeds, "m" if op.process == "milling" else "m/rev", "--feeds"),
+        "tool_speeds": _values(tool, "rad/s", "--tool-speeds"),
+        "workpiece_speeds": _values(workpiece, "rad/s", "--workpiece-speeds"),
+        "depths": _values(depths, "m", "--depths"),
+        "feeds": _values(feeds, "m" if op.process == "milling" else "m/rev", "--feeds"),
     }
     if op.process == "milling" and workpiece is not None:
         raise InputError("--workpiece-speeds goes with turn-milling")
     return replace(default_grid(op), **{k: v for k, v in given.items() if v is not None})
 
 
-def _range(text: str | None, unit: str, option: str) -> tuple[float, ...] | None:
-    """Ascending SI values of "A,B,C" or "FIRST:LAST:COUNT"."""
-    if text is None:
-        return None
-    parts = text.split(":")
-    if len(parts) == 3 and parts[2].strip().isdigit() and 2 <= int(parts[2]) <= 2000:
-        ends = [quantity(p, unit, option) for p in parts[:2]]
-        return tuple(np.linspace(*ends, int(parts[2])).tolist())  # type: ignore[call-overload]
-    if len(parts) != 1:
-        raise InputError(option, value=text, expected="FIRST:LAST:COUNT with a count of 2 to 2000, or A,B,...")
-    return tuple(v for p in text.split(",") if (v := quantity(p.strip(), unit, option)) is not None)
+def _values(text: str | None, unit: str, option: str) -> tuple[float, ...] | None:
+    return None if text is None else tuple(values(text, unit, option))
 
 
 def _write(path: Path | None, op: Operation, chosen: Choice | None, samples: int, seed: int) -> Path | None:

@@ -31,11 +31,6 @@ if TYPE_CHECKING:
 Axis = Literal["x", "y", "z", "b"]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(positions)
-
-
 def positions(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None,

@@ -31,14 +31,6 @@ OutputOption = Annotated[
 BagArgument = Annotated[Path, typer.Argument(metavar="BAG", help="Recording (MCAP).")]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands of this module to `app`."""
-    app.command()(simulate)
-    app.command("import")(import_recording)
-    app.command("analyze")(analyze_bags)
-    app.command()(recover)
-
-
 def simulate(
     op_name: OperationArgument, output: OutputOption,
     duration: Annotated[str | None, typer.Option(help="How long, e.g. 10s; default: the operation's schedule.")] = None,

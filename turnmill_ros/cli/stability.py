@@ -16,11 +16,6 @@ DelayOption = Annotated[Delay, typer.Option(
     "--delay", help="Model of the regeneration delay; turnmill delay shows them all.")]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(stability)
-
-
 def stability(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None, delay: DelayOption = "mean",

@@ -23,11 +23,6 @@ from turnmill_ros.cli.output import (
 from turnmill_ros.errors import InputError
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(surface)
-
-
 def surface(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None,

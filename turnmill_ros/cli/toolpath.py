@@ -25,11 +25,6 @@ Kind = Literal["orthogonal", "tangential", "coaxial", "curved"]
 ROWS_SHOWN = 20
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(toolpath)
-
-
 def toolpath(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="Path file (APT-CL).")] = None,
     generate: Annotated[Kind | None, typer.Option(help="Make a turn-milling path instead of reading one.")] = None,

@@ -23,11 +23,6 @@ from turnmill_ros.cli.output import (
 MOST_TURNS = 2000
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(vibration)
-
-
 def vibration(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None,

@@ -30,11 +30,6 @@ if TYPE_CHECKING:
 PLANES = ("x", "y")
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command()(workpiece)
-
-
 def workpiece(
     op_name: OperationArgument, tool_speed: ToolSpeed = None, workpiece_speed: WorkpieceSpeed = None,
     depth: Depth = None,

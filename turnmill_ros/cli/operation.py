@@ -12,11 +12,6 @@ from turnmill_ros.cli.output import JsonFlag, SetOption, console, print_json, ta
 from turnmill_ros.errors import InputError
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands of this module to `app`."""
-    app.command()(operation)
-
-
 def operation(
     file: Annotated[str | None, typer.Argument(metavar="FILE", help="Operation file or shipped name.")] = None,
     as_json: JsonFlag = False,
