@@ -34,7 +34,7 @@ def summary_rows(found: Tally) -> list[tuple[str, str, str]]:
         (f"Hopf chatter found within {LATE:g} s of full amplitude", _share(found.hopf), "at least 95 %"),
         ("period two, odd teeth, found likewise", _share(found.flip_odd), "at least 90 %"),
         ("flip or runout, even teeth, prior of a wrong model", _share(found.half_order_prior), "at least 90 %"),
-        ("the same without a prior: FLIP_OR_RUNOUT", _share(found.half_order), "all"),
+        ("flip, even teeth, without a prior: FLIP_OR_RUNOUT", _share(found.half_order), "at least 90 %"),
         ("alarm on depth ramps after 20 %, median", f"{np.nanmedian(delays):.3f} s" if len(delays) else "none asked",
          f"at most {LATE:g} s"),
         ("alarm on depth ramps before tripled", _share((in_time, len(delays))), "all"),

@@ -64,7 +64,7 @@ def test_even_teeth_need_a_prior_and_odd_ones_do_not() -> None:
     even = heard("RRRR", "FFSS", with_prior=np.array([5, 2, 2, 2], dtype=np.int8))
     found = tally([even, heard("HHHH", "HHHH")])
     assert found.half_order_prior == (3, 4)
-    assert found.half_order == (4, 4)
+    assert found.half_order == (2, 2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -143,6 +143,6 @@ def test_the_whole_corpus() -> None:
     assert found.hopf[0] >= 0.95 * found.hopf[1] > 0
     assert found.flip_odd[0] >= 0.9 * found.flip_odd[1] > 0
     assert found.half_order_prior[0] >= 0.9 * found.half_order_prior[1] > 0
-    assert found.half_order[0] == found.half_order[1]
+    assert found.half_order[0] >= 0.9 * found.half_order[1] > 0
     assert float(np.nanmedian(found.delays)) < 0.3
     assert found.areas[0] > max(found.areas[1:])

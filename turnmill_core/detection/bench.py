@@ -47,7 +47,7 @@ class Tally:
     confusion (7, 7): windows by true kind (rows) and verdict. false_alarms, hours, undecided: alarms without chatter
     in all signals that truly have none, the hours of them, and runs of FLIP_OR_RUNOUT there. hopf, flip_odd: (found,
     episodes) with the right verdict within 0.3 s of full amplitude. half_order_prior, half_order: (right, windows) of
-    half-order lines with an even number of teeth, with a wrong model's prior and without (right: FLIP_OR_RUNOUT).
+    half-order lines with an even number of teeth, with a wrong model's prior and without (flips only).
     delays, tripled: of every ramp, alarm after the 20 % crossing [s] (NaN: none), and time from crossing to tripled.
     areas: of the ROC per indicator. changed: (windows whose verdict changes, windows) with the tachometer 1 % wrong.
     recalls (r,), false_at (r, indicators): false alarms per hour at each recall. cpu: of the monitor per second
@@ -163,19 +163,24 @@ def _delay(h: Heard) -> float:
 
 
 def _half_order(found: Sequence[Heard], prior: bool) -> tuple[int, int]:
-    """Windows with half-order lines of even teeth (told FLIP_OR_RUNOUT without a prior) that are judged right."""
+    """Windows with half-order lines of even teeth that are judged right: (right, windows).
+
+    Without a prior: of all that truly flip, those said to be FLIP_OR_RUNOUT. With the wrong model's prior: of all that
+    truly flip, those said to be FLIP; and of those with runout that looks like it, those said to be STABLE.
+    """
     right = total = 0
     for h in found:
         if not len(h.with_prior):
             continue
-        lines = h.state == int(ChatterKind.FLIP_OR_RUNOUT)
-        truth = h.truth[lines]
-        known = np.isin(truth, (int(ChatterKind.FLIP), int(ChatterKind.STABLE)))
-        total += int(known.sum())
+        flips = h.truth == int(ChatterKind.FLIP)
+        alike = (h.truth == int(ChatterKind.STABLE)) & (h.state == int(ChatterKind.FLIP_OR_RUNOUT))
         if prior:
-            right += int(np.sum(h.with_prior[lines][known] == truth[known]))
+            total += int(flips.sum() + alike.sum())
+            right += int(np.sum(h.with_prior[flips] == int(ChatterKind.FLIP)))
+            right += int(np.sum(h.with_prior[alike] == int(ChatterKind.STABLE)))
         else:
-            right += int(known.sum())
+            total += int(flips.sum())
+            right += int(np.sum(h.state[flips] == int(ChatterKind.FLIP_OR_RUNOUT)))
     return right, total
 
 
