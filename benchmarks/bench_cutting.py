@@ -7,14 +7,12 @@ Best of several runs. The calibration loop (a fixed numpy job) tells how fast th
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
+from common import calibration, run
 
 from turnmill_core.cutting.chip import prepare_cut
 from turnmill_core.cutting.engagement_map import engagement_along
@@ -36,12 +34,6 @@ def best_of(job: Callable[[], object], runs: int) -> float:
         job()
         times.append(time.perf_counter() - begin)
     return min(times)
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s]."""
-    values = np.random.default_rng(1).random(200_000)
-    return best_of(lambda: np.sort(values), 10)
 
 
 def slot() -> Operation:
@@ -93,17 +85,5 @@ def numeric_engagement(points: int = 1000) -> dict[str, float]:
     return result
 
 
-def main() -> None:
-    """Print the figures as a table or as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    figures = measure()
-    if parser.parse_args().json:
-        print(json.dumps(figures))
-        return
-    for name, value in figures.items():
-        print(f"{name:45s} {value:.6g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

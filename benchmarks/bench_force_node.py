@@ -10,8 +10,6 @@ the machine is at the moment.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import os
 import subprocess
@@ -28,6 +26,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 import numpy as np
 import rclpy
 import yaml
+from common import calibration, run
 from rclpy.node import Node
 
 from turnmill_core.machine.controller import axis_state_at
@@ -50,17 +49,6 @@ def cpu_seconds(pid: int) -> float:
     """Processor time that a process has used [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s]."""
-    values = np.random.default_rng(1).random(200_000)
-    times = []
-    for _ in range(10):
-        begin = time.perf_counter()
-        np.sort(values)
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def share(op: Operation, engagement: str, measured: bool = False) -> dict[str, float]:
@@ -130,17 +118,5 @@ def measure() -> dict[str, float]:
     return result
 
 
-def main() -> None:
-    """Print the figures as a table or as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    figures = measure()
-    if parser.parse_args().json:
-        print(json.dumps(figures))
-        return
-    for name, value in figures.items():
-        print(f"{name:45s} {value:.6g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

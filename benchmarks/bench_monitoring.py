@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
+from common import calibration
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.monitoring.chatter import ChatterConfig, SpindleSpeed, initial, update
@@ -25,17 +26,6 @@ from turnmill_core.monitoring.verdict import ChatterKind
 RATE = 51200.0
 CHANNELS = tuple(Channel(f"ch{k}", "displacement", "m") for k in range(5))
 BLOCK = 1024
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s], best of 10."""
-    values = np.random.default_rng(1).random(200_000)
-    times = []
-    for _ in range(10):
-        begin = time.perf_counter()
-        np.sort(values)
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def items(seconds: float, rpm: float, chatter: float, axes: bool) -> Iterator[SensorBlock | SpindleSpeed]:

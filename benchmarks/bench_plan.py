@@ -9,15 +9,13 @@ plan to warm up.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-import numpy as np
+from common import calibration, run
 
 from turnmill_core.operation_file import read_operation, shipped_operations
 from turnmill_core.process.plan import default_grid, plan
@@ -41,8 +39,7 @@ def measure() -> dict[str, float]:
     op, result = read_operation(shipped_operations()["thesis_table_5_1"]), {}
     five = tuple(w * RPM for w in (10, 20, 30, 40, 50))
     plan(op, replace(default_grid(op, 8, 8), workpiece_speeds=five[:1]))
-    values = np.random.default_rng(1).random(200_000)
-    timed(result, "calibration", lambda: np.sort(values))
+    result["calibration_s"] = calibration()
     made = timed(result, "plan", lambda: plan(op, replace(default_grid(op, 200, 100), workpiece_speeds=five)))
     draws = timed(result, "draws_40", lambda: draw(op, 40))
     robust = timed(result, "robust", lambda: robust_choice(made, draws, 0.9))
@@ -54,18 +51,5 @@ def measure() -> dict[str, float]:
     return result
 
 
-def main() -> None:
-    """Print the figures, with --json as one object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    as_json = parser.parse_args().json
-    figures = measure()
-    if as_json:
-        print(json.dumps(figures))
-    else:
-        for name, value in figures.items():
-            print(f"{name:48s} {value:12.6g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

@@ -10,12 +10,10 @@ revolution with axial vibration (six points to a tooth pass, 200 along the bar).
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable
 
-import numpy as np
+from common import calibration, run
 
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.operation import Operation
@@ -31,17 +29,6 @@ from turnmill_core.process.surface_map import surface_map
 from turnmill_core.process.vibration import time_solution
 
 FIVE = SimulationConfig(sample_rate=51200, channels=("sound", "tool_x", "tool_y", "workpiece_x", "workpiece_y"))
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s], best of 10."""
-    values = np.random.default_rng(1).random(200_000)
-    times = []
-    for _ in range(10):
-        begin = time.perf_counter()
-        np.sort(values)
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def real_time_factor(op: Operation, config: SimulationConfig, duration: float, runs: int = 3) -> float:
@@ -128,18 +115,5 @@ def measure() -> dict[str, float]:
     }
 
 
-def main() -> None:
-    """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
-    arguments = parser.parse_args()
-    figures = measure()
-    if arguments.json:
-        print(json.dumps(figures))
-    else:
-        for name, value in figures.items():
-            print(f"{name:52s} {value:10.4g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

@@ -7,13 +7,11 @@ The shipped demonstration (two channels at 12.8 kHz); CPU seconds, best of three
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
+from common import calibration, run
 
 from turnmill_ros import conversions
 from turnmill_ros.analysis import analyze
@@ -35,8 +33,6 @@ def best_of(job: Callable[[], object], runs: int = 3) -> float:
 
 def measure() -> dict[str, float]:
     """All figures: name with unit -> value."""
-    values = np.random.default_rng(1).random(200_000)
-    calibration = best_of(lambda: np.sort(values), 10)
 
     def blocks() -> list[object]:
         return [conversions.block_from_message(m) for _, _, m in read_bag(BAG, ["sensor_blocks"])]
@@ -48,7 +44,7 @@ def measure() -> dict[str, float]:
     seconds = result.seconds(result.verdicts[-1].window_end_ns)
     analysed = best_of(lambda: analyze(BAG), 1)
     return {
-        "calibration_s": calibration,
+        "calibration_s": calibration(),
         "messages_raw_per_s": count / raw,
         "sensor_blocks_decoded_per_s": len(blocks()) / decoded,
         "analysis_times_real_time": seconds / analysed,
@@ -56,17 +52,5 @@ def measure() -> dict[str, float]:
     }
 
 
-def main() -> None:
-    """Print the figures as a table or as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    figures = measure()
-    if parser.parse_args().json:
-        print(json.dumps(figures))
-        return
-    for name, value in figures.items():
-        print(f"{name:45s} {value:.6g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

@@ -9,14 +9,13 @@ round bar and delayed workpiece rotation.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import statistics
 import time
 from collections.abc import Callable
 
 import numpy as np
+from common import calibration, run
 
 from turnmill_core.machine.conditions import with_cut
 from turnmill_core.operation import Operation
@@ -41,12 +40,6 @@ def times(job: Callable[[], object], runs: int) -> list[float]:
         job()
         found.append(time.process_time() - begin)
     return found
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s]."""
-    values = np.random.default_rng(1).random(200_000)
-    return min(times(lambda: np.sort(values), 10))
 
 
 def margins(op: Operation, count: int) -> list[float]:
@@ -102,18 +95,5 @@ def measure() -> dict[str, float]:
     return result
 
 
-def main() -> None:
-    """Print the figures, with --json as one object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    as_json = parser.parse_args().json
-    figures = measure()
-    if as_json:
-        print(json.dumps(figures))
-    else:
-        for name, value in figures.items():
-            print(f"{name:48s} {value:12.6g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

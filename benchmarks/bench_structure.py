@@ -8,12 +8,11 @@ were not asked for before; one chuck from 600 lines of a dummy's receptances.
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable
 
 import numpy as np
+from common import calibration, run
 
 from turnmill_core.machine.conditions import machine_from_tool, nominal_axes
 from turnmill_core.operation import Operation
@@ -23,12 +22,6 @@ from turnmill_core.structure.at import Position, structure_at
 from turnmill_core.structure.beam import free_bar, on_chuck, receptances
 from turnmill_core.structure.profile import stock_profile
 from turnmill_core.structure.receptance import chuck_from_dummy
-
-
-def calibration() -> float:
-    """Time of sorting 200 000 fixed numbers [s], best of 10."""
-    values = np.random.default_rng(1).random(200_000)
-    return min(took(lambda: np.sort(values)) for _ in range(10))
 
 
 def took(work: Callable[[], object]) -> float:
@@ -63,25 +56,12 @@ def chuck(op: Operation) -> float:
                for _ in range(5))
 
 
-def figures() -> dict[str, float]:
+def measure() -> dict[str, float]:
     """What is measured, by name with its unit."""
     table, bar = (read_operation(shipped_operations()[name]) for name in ("thesis_table_4_5", "thesis_table_4_7"))
     return {"calibration_s": calibration(), **followed(table, "mode_table"), **followed(bar, "bar_in_process"),
             "chuck_from_600_lines_ms": 1e3 * chuck(bar)}
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
-    asked = parser.parse_args()
-    found = figures()
-    if asked.json:
-        print(json.dumps(found))
-        return
-    for name, value in found.items():
-        print(f"{name:40s} {value:.4g}")
-
-
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__)

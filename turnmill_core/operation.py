@@ -222,6 +222,7 @@ class Operation:
     workpiece revolution (turn-milling); feed_per_tooth [m] the feed of the table (milling); the
     other is 0. milling_sense: "up", "down", "slot" or "centred". schedule: what a simulated
     controller runs, at least two points, or empty (then the nominal cut is held).
+    eccentricity [m] and tilt [rad] of the tool in turn-milling, 0 in milling.
     limits: what machine, tool and part allow. process_damping: of the flank.
     trials: cuts that were made. sensors: calibration of channels in volts. sources: where the numbers
     come from. text, sha256: the file it was read from, byte for byte.

@@ -13,15 +13,15 @@ def require(ok: bool, name: str, value: object, unit: str, bound: str) -> None:
 
 
 def finite(name: str, value: float, unit: str) -> None:
-    """Refuse a number that is not finite."""
+    """Refuse a `value` [unit] that is not finite."""
     require(math.isfinite(value), name, value, unit, "a finite number")
 
 
 def positive(name: str, value: float, unit: str) -> None:
-    """Refuse a number that is not finite and > 0."""
+    """Refuse a `value` [unit] that is not finite and > 0."""
     require(math.isfinite(value) and value > 0, name, value, unit, "a finite number > 0")
 
 
 def not_negative(name: str, value: float, unit: str) -> None:
-    """Refuse a number that is not finite and >= 0."""
+    """Refuse a `value` [unit] that is not finite and >= 0."""
     require(math.isfinite(value) and value >= 0, name, value, unit, "a finite number >= 0")
