@@ -265,13 +265,13 @@ def test_the_stability_monitor_answers_and_repeats_an_unchanged_cut_cheaply(prob
     for k in range(1, 250):
         probe.publish(topics.JOINT_STATES, axes_to_message(replace(state, stamp_ns=k * 4_000_000), ros_types()))
     heard = probe.heard["stability_margin"]
-    assert probe.until(lambda: len(heard) == 5)
+    assert probe.until(lambda: len(heard) == 10)
     found = [margin_from_message(m) for m in heard]
     cut = conditions_from_axes(op, state)
     margin = stability_margin(op, cut)
     assert all(f["spectral_radius"] == pytest.approx(margin.spectral_radius, rel=1e-9) for f in found)
     assert {f["predicted_type"] for f in found} == {margin.predicted_type}
-    assert [f["stamp_ns"] for f in found] == [k * 200_000_000 + 4_000_000 for k in range(5)]
+    assert [f["stamp_ns"] for f in found] == [k * 100_000_000 + 4_000_000 for k in range(10)]
     assert found[-1]["depth_limit"] == pytest.approx(margin.depth_limit)
     assert found[-1]["depth_ratio"] == pytest.approx(cut.depth / margin.depth_limit)
     assert probe.until(lambda: probe.value("stability_monitor", "cuts_evaluated") == "1")

@@ -12,14 +12,15 @@ from turnmill_ros.nodes.chatter_monitor import SETTINGS, ChatterMonitor
 from turnmill_ros.nodes.controller import Controller
 from turnmill_ros.nodes.force_predictor import ForcePredictor
 from turnmill_ros.nodes.operation_server import OperationServer
+from turnmill_ros.nodes.planner import Planner
 from turnmill_ros.nodes.player import Player
 from turnmill_ros.nodes.process_simulator import ProcessSimulator
 from turnmill_ros.nodes.recorder import Recorder
 from turnmill_ros.nodes.stability_monitor import StabilityMonitor
 
 pytestmark = pytest.mark.ros
-NODES = (ChatterMonitor, Controller, ForcePredictor, OperationServer, Player, ProcessSimulator, Recorder,
-         StabilityMonitor)
+NODES = (ChatterMonitor, Controller, ForcePredictor, OperationServer, Planner, Player, ProcessSimulator,
+         Recorder, StabilityMonitor)
 
 
 @pytest.mark.parametrize("cls", NODES, ids=lambda cls: cls.__name__)
@@ -37,7 +38,8 @@ def test_every_parameter_is_described_and_every_number_bounded(probe: Probe, cls
 
 def test_the_monitors_settings_are_parameters_with_the_cores_defaults(probe: Probe) -> None:
     node, default = probe.add(ChatterMonitor), ChatterConfig(teeth=1)
-    from_elsewhere = {"teeth", "nominal_speed", "equal_pitch", "expect_axes", "recorded_priors", "noise_floor"}
+    from_elsewhere = {"teeth", "nominal_speed", "equal_pitch", "expect_axes", "recorded_priors", "noise_floor",
+                      "sensors"}
     assert {field.name for field in fields(ChatterConfig)} == SETTINGS.keys() | from_elsewhere
     for name in SETTINGS:
         value = node.get_parameter(name).value
