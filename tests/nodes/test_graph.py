@@ -93,6 +93,8 @@ def test_replay_and_analysis_give_the_live_verdicts(
     result, path, _ = live
     again = replay(path, rate=math.inf, output=tmp_path / "again.mcap")
     assert again.sent == again.received == again.judged == again.recorded == result.sent
+    for name in ("force_predictor", "stability_monitor", "chatter_monitor", "recorder"):  # what the player waits for
+        assert again.values[name]["taken /joint_states"] == again.values["player"]["sent joint_states"]
     assert differences(again.verdicts, result.verdicts) == []
     assert differences(recorded(tmp_path / "again.mcap"), result.verdicts) == []
     assert differences(analyze(path).verdicts, result.verdicts) == []

@@ -55,7 +55,7 @@ class ForcePredictor(LifecycleNode):
         self._received, self._sent, self._refused = 0, 0, ""
         self._out = {topic: support.publisher(self, topic, keep_all=lossless) for topic in (
             topics.CUTTING_LOADS, topics.WRENCH_TOOL, topics.WRENCH_MACHINE, topics.FORCE_SCALE, *LOAD_PLOTS)}
-        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None, paced=lossless)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes, raw=True)
         support.subscription(self, topics.SENSOR_BLOCKS, self.on_block, raw=True)

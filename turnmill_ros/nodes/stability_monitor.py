@@ -55,7 +55,7 @@ class StabilityMonitor(LifecycleNode):
         self._slowest = 0.0
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.STABILITY_MARGIN, topics.STABILITY_LOBES, *MARGIN_PLOTS)}
-        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None)
+        self.diagnostics = support.Diagnostics(self, self._values, lambda: self._refused or None, paced=lossless)
         support.subscription(self, topics.OPERATION, self.on_operation)
         support.subscription(self, topics.JOINT_STATES, self.on_axes)
         self.create_service(GetStability, "get_stability", self.on_get)
