@@ -1,12 +1,15 @@
-"""Stability diagrams in a process of their own, so that margins keep their pace."""
+"""Stability diagrams in a process of their own, so that margins keep their pace.
+
+The process is `python -m turnmill_ros.lobe_process`: a pickled request on stdin, the pickled answer on stdout.
+"""
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
+import pickle
+import select
+import subprocess
+import sys
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 
 import numpy as np
 
@@ -36,7 +39,7 @@ class LobeProcess:
     """Computes one diagram at a time; of those that wait the newest is next."""
 
     def __init__(self) -> None:
-        self._running: tuple[LobeRequest, BaseProcess, Connection] | None = None
+        self._running: tuple[LobeRequest, subprocess.Popen[bytes]] | None = None
         self._waiting: LobeRequest | None = None
 
     @property
@@ -51,14 +54,15 @@ class LobeProcess:
 
     def found(self, wait: float = 0.0) -> tuple[LobeRequest, Lobes | str] | None:
         """The diagram that was finished, or why there is none; None where none is ready within `wait` [s]."""
-        if self._running is None or not self._running[2].poll(wait):
+        if self._running is None:
             return None
-        request, process, answers = self._running
-        try:
-            result: Lobes | str = answers.recv()
-        except EOFError:
-            result = f"the process of the diagram ended with exit code {process.exitcode}"
-        self._end()
+        request, process = self._running
+        if not select.select([process.stdout], [], [], wait)[0]:
+            return None
+        answer, _ = process.communicate()
+        result: Lobes | str = (pickle.loads(answer) if process.returncode == 0
+                               else f"the process of the diagram ended with exit code {process.returncode}")
+        self._running = None
         self._start()
         return request, result
 
@@ -71,29 +75,33 @@ class LobeProcess:
         if self._running is not None or self._waiting is None:
             return
         request, self._waiting = self._waiting, None
-        spawn = multiprocessing.get_context("spawn")
-        answers, sender = spawn.Pipe(duplex=False)
-        process = spawn.Process(target=_compute, args=(sender, request), name="lobes", daemon=True)
-        process.start()
-        sender.close()
-        self._running = request, process, answers
+        process = subprocess.Popen([sys.executable, "-m", "turnmill_ros.lobe_process"], stdin=subprocess.PIPE,
+                                   stdout=subprocess.PIPE, start_new_session=True)  # Ctrl-C is for the node
+        assert process.stdin is not None
+        process.stdin.write(pickle.dumps(request))
+        process.stdin.close()
+        process.stdin = None  # communicate() writes nothing more
+        self._running = request, process
 
     def _end(self) -> None:
         if self._running is None:
             return
-        _, process, answers = self._running
+        _, process = self._running
         self._running = None
-        answers.close()
-        process.terminate()
-        process.join()
+        process.kill()
+        process.communicate()
 
 
-def _compute(sender: Connection, request: LobeRequest) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the node ends this process
+def diagram(request: LobeRequest) -> Lobes | str:
+    """The diagram that is asked for, or why there is none."""
     op = request.op
     speeds = op.conditions.tool_speed * np.linspace(0.7, 1.3, request.points)
     depths = np.linspace(0.0, searched_depth(op, request.cut), DEPTHS + 1)[1:]
     try:
-        sender.send(stability_lobes(op, speeds, depths, request.cut.workpiece_speed, position=request.position))
+        return stability_lobes(op, speeds, depths, request.cut.workpiece_speed, position=request.position)
     except ValueError as error:
-        sender.send(str(error))
+        return str(error)
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(pickle.dumps(diagram(pickle.load(sys.stdin.buffer))))
