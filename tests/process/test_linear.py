@@ -112,9 +112,10 @@ def test_linear_and_nonlinear_time_solution_agree_in_contact() -> None:
     assert np.all(np.abs(found - solution.tool).max(axis=0) < 1e-3 * size)
 
 
-def test_orbit_is_the_steady_state_of_the_nonlinear_simulation() -> None:
+@pytest.mark.parametrize("material", [ALUMINIUM, EDGES], ids=["shear", "edge forces"])
+def test_orbit_is_the_steady_state_of_the_nonlinear_simulation(material: Material) -> None:
     """Turn-milling with helix, contact kept: within 0.1 % of the largest displacement in each direction."""
-    op = at(replace(TURNED, material=ALUMINIUM), depth=4e-4)
+    op = at(replace(TURNED, material=material), depth=4e-4)
     op = replace(op, workpiece=replace(op.workpiece, structure=replace(op.workpiece.structure, modes=())))
     steps = 1200
     steady = periodic_orbit(made(op, steps))

@@ -65,7 +65,7 @@ def linear_cut(
     delay_model, position: as in stability_problem, and the errors too. Raises ``ValueError`` for modes that turn with a
     spindle: they have no fixed shape.
     """
-    problem = stability_problem(op, conditions, delay_model, position)
+    problem = stability_problem(op, conditions, delay_model, position, levelled=False)
     modes, tool_modes = contact_modes_at(op, conditions, position)
     runout = np.array(op.tool.runout or (0.0,) * op.tool.teeth)
     material = op.material

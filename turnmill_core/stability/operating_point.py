@@ -30,15 +30,18 @@ BAR_SAMPLES = 400
 
 def stability_problem(
     op: Operation, conditions: Conditions, delay_model: DelayModel = "mean", position: Position | None = None,
+    levelled: bool = True,
 ) -> StabilityProblem:
     """The stability problem of `op` at `conditions`.
 
     delay_model: "mean" (Eq. 4.88), "milling" or "first-principles"; see :mod:`turnmill_core.stability.delay`.
-    position: axis positions for modes that depend on them, as in structure_at.
+    position: axis positions for modes that depend on them, as in structure_at. levelled: leave out a bend of the
+    arcs in the last micrometres under a bar's surface, which the chip's gain hardly feels but edge forces do.
     Raises ``ValueError`` for zero engagement, zero tool speed, a depth beyond the flutes, a rigid structure, an unknown
     delay model, a tool that is no cylinder, and an eccentric or tilted one.
     """
-    return depth_family(op, conditions, conditions.depth, delay_model, position).problem(conditions.depth)
+    family = depth_family(op, conditions, conditions.depth, delay_model, position, levelled)
+    return family.problem(conditions.depth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +150,11 @@ class DepthFamily:
 
 def depth_family(
     op: Operation, conditions: Conditions, deepest: float, delay_model: DelayModel = "mean",
-    position: Position | None = None,
+    position: Position | None = None, levelled: bool = True,
 ) -> DepthFamily:
     """The problems of `op` at `conditions` for every depth up to `deepest` [m].
 
-    delay_model, position and errors: as stability_problem.
+    delay_model, position, levelled and errors: as stability_problem.
     At a height the arcs depend on the distance from the C axis only, so the deepest cut holds all others.
     """
     require(conditions.tool_speed > 0, "tool speed", conditions.tool_speed, "rad/s", "a number > 0")
@@ -169,7 +172,7 @@ def depth_family(
         below, start, stop = np.array([0.0, deepest]), np.repeat(arcs.start, 2, axis=0), np.repeat(arcs.exit, 2, axis=0)
     else:
         kink = min(max(deepest - _narrowing_height(op, cut), 0.0), deepest)
-        below, start, stop = _bar_arcs(op, cut, kink)
+        below, start, stop = _bar_arcs(op, cut, kink, levelled)
     cuts = np.any(stop > start, axis=0)
     require(bool(np.any(cuts)), "engagement", 0.0, "rad", "a tool that cuts")
     start, stop = start[:, cuts], stop[:, cuts]
@@ -192,7 +195,9 @@ def _falling(intervals: int) -> Floats:
     return frozen_array(np.linspace(1.0, 0.0, intervals + 1), "fractions", (-1,))
 
 
-def _bar_arcs(op: Operation, deepest: Conditions, kink: float) -> tuple[Floats, Floats, Floats]:
+def _bar_arcs(
+    op: Operation, deepest: Conditions, kink: float, levelled: bool,
+) -> tuple[Floats, Floats, Floats]:
     """Depths under the surface (k,) [m] and the engagement angles there, start and exit (k, 2) [rad], of a bar."""
     depth = deepest.depth
     below = np.unique(np.concatenate([depth * np.linspace(0, 1, BAR_SAMPLES) ** 2, [kink]]))
@@ -202,7 +207,8 @@ def _bar_arcs(op: Operation, deepest: Conditions, kink: float) -> tuple[Floats, 
         # one arc past 90 degrees below, two above: split it there, so that both forms join
         whole = (stop[:, 1] <= start[:, 1]) & (start[:, 0] < math.pi / 2) & (stop[:, 0] > math.pi / 2)
         stop[whole, 1], start[whole, 1], stop[whole, 0] = stop[whole, 0], math.pi / 2, math.pi / 2
-    _level_sliver(op, below, start[:, 0], stop[:, 0])
+    if levelled:
+        _level_sliver(op, below, start[:, 0], stop[:, 0])
     return below, start, stop
 
 
