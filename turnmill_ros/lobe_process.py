@@ -5,6 +5,7 @@ The process is `python -m turnmill_ros.lobe_process`: a pickled request on stdin
 
 from __future__ import annotations
 
+import os
 import pickle
 import select
 import subprocess
@@ -19,6 +20,9 @@ from turnmill_core.stability.margin import searched_depth
 from turnmill_core.structure.at import Position
 
 DEPTHS = 32
+"""Depths of a diagram."""
+NICE = 10
+"""How much lower the priority of its process is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,4 +108,5 @@ def diagram(request: LobeRequest) -> Lobes | str:
 
 
 if __name__ == "__main__":
+    os.nice(NICE)
     sys.stdout.buffer.write(pickle.dumps(diagram(pickle.load(sys.stdin.buffer))))

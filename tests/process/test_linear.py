@@ -10,7 +10,7 @@ import pytest
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from tests.process.cases import ALUMINIUM, BENCHMARK_MODE, RPM, at, exact_config, milling, run, turn_milling
-from tests.process.test_growth import CASES, leading, random_cut
+from tests.process.test_growth import CASES, leading, seeded_cuts
 from turnmill_core.cutting.forces import revolution
 from turnmill_core.operation import Material, Mode, Operation
 from turnmill_core.process._kernels.march import march
@@ -133,16 +133,7 @@ def test_perturbation_grows_as_the_multipliers_say(name: str) -> None:
 @pytest.mark.slow
 def test_growth_at_seeded_points() -> None:
     """50 random cuts of bars and blocks, where |mu| is more than 0.02 from 1 and does not vanish in a period."""
-    compared: list[float] = []
-    seed = 0
-    while len(compared) < 50:
-        op = random_cut(seed)
-        seed += 1
-        expected = leading(op, 160)
-        if abs(abs(expected) - 1) < 0.02 or abs(expected) < 0.3:
-            continue
-        compared.append(growth(made(op, 320)) / math.log(abs(expected)) - 1)
-        print(seed - 1, f"{abs(expected):.4f}", f"{compared[-1]:.2e}")
+    compared = [growth(made(op, 320)) / math.log(expected) - 1 for op, expected in seeded_cuts(50)]
     assert max(map(abs, compared)) < 0.01
 
 

@@ -95,10 +95,8 @@ def test_air_is_air() -> None:
 
 @pytest.mark.parametrize("name", shipped_operations())
 def test_every_shipped_operation_can_be_simulated(name: str) -> None:
-    """Rigid ones too; the samples are finite and a force is there at some time. Modes that turn are refused."""
+    """Rigid ones too; the samples are finite and a force is there where the tool cuts. Modes that turn are refused."""
     op = replace(read_operation(shipped_operations()[name]), schedule=())
-    if op.conditions.depth <= 0:
-        pytest.skip("not in the cut")
     config = SimulationConfig(channels=("sound", "tool_x", "workpiece_y", "force_y"), force_noise=0.0)
     if "rotating" in (op.tool.structure.frame, op.workpiece.structure.frame):
         with pytest.raises(ValueError, match="do not turn"):
@@ -106,4 +104,5 @@ def test_every_shipped_operation_can_be_simulated(name: str) -> None:
         return
     found = samples(list(simulate(op, config, 0, duration=0.2)))
     assert np.all(np.isfinite(found))
-    assert np.abs(found[:, 3]).max() > 2
+    largest = np.abs(found[:, 3]).max()
+    assert largest > 2 if op.conditions.depth > 0 else largest == 0
