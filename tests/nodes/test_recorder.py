@@ -18,6 +18,7 @@ from turnmill_ros import topics
 from turnmill_ros.bag import bag_info, read_bag, recover
 from turnmill_ros.conversions import block_to_message, operation_to_message
 from turnmill_ros.interfaces import ros_types
+from turnmill_ros.nodes import _support as support
 
 pytestmark = pytest.mark.ros
 
@@ -47,6 +48,7 @@ def test_sigint_leaves_a_complete_recording(probe: Probe, tmp_path: Path) -> Non
     process = launch("recorder", tmp_path, bag=str(path))
     start(probe, process)
     feed(probe, range(100))
+    assert support.wait_until_acknowledged(probe, 20.0)  # what is on its way to it, a node cannot write
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 0
     assert firsts(path) == [k * 128 for k in range(100)]
