@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turnmill_core.detection.cuts import KINDS, TRAIN_END
-from turnmill_core.detection.endless import QUIET_KINDS, SECONDS, quiet_motion
+from turnmill_core.detection.endless import QUIET_KINDS, SECONDS, TRIED, quiet_motion
 from turnmill_core.detection.hearing import ALARMS, INDICATORS, NO_TRUTH, Heard, hear_cut, hear_quiet
 from turnmill_core.monitoring.evaluation import roc_area
 from turnmill_core.monitoring.verdict import ChatterKind
@@ -76,7 +76,7 @@ class Tally:
 def run(plan: Plan, jobs: int = 1, progress: Callable[[float], None] | None = None) -> list[Heard]:
     """Hear all signals of a plan, in `jobs` processes; progress: called with the share done."""
     tasks = [("cut", kind, plan.first + n) for kind, count in zip(KINDS, plan.cuts, strict=True) for n in range(count)]
-    tasks += [("quiet", QUIET_KINDS[n % len(QUIET_KINDS)], plan.first // 1000 + n) for n in range(plan.quiet)]
+    tasks += [("quiet", QUIET_KINDS[n % len(QUIET_KINDS)], plan.first // TRIED + n) for n in range(plan.quiet)]
     found: list[Heard] = []
     if jobs == 1:
         results: Iterable[list[Heard]] = map(hear, tasks)

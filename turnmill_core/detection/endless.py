@@ -35,14 +35,16 @@ TABLE = 8192
 SETTLED = AIR_SECONDS + ENTRY_SECONDS + 0.2
 HELD_UNTIL = AIR_SECONDS + ENTRY_SECONDS + 0.8
 LARGEST_RATIO = 0.05
+TRIED = 100
+"""Cuts that are looked through for a quiet one; so numbers of quiet signals below TRAIN_END / TRIED serve to develop."""
 
 
 def quiet_motion(kind: str, number: int) -> Motion:
-    """Motion of the first stable cut from `number` * 1000 on whose attractor repeats with the revolution.
+    """Motion of the first stable cut from `number` * TRIED on whose attractor repeats with the revolution.
 
     kind: of QUIET_KINDS; "air" takes the sounds of a stable cut's machine.
     """
-    for k in range(1000 * number, 1000 * (number + 1)):
+    for k in range(TRIED * number, TRIED * (number + 1)):
         cut = make_cut("stable" if kind == "air" else kind, k)
         if cut.margin.spectral_radius < 0.9:
             motion = simulate_cut(cut)
