@@ -36,7 +36,7 @@ SETTLED = AIR_SECONDS + ENTRY_SECONDS + 0.2
 HELD_UNTIL = AIR_SECONDS + ENTRY_SECONDS + 0.8
 LARGEST_RATIO = 0.05
 TRIED = 100
-"""Cuts that are looked through for a quiet one; so numbers of quiet signals below TRAIN_END / TRIED serve to develop."""
+"""Cuts looked through for a quiet one; quiet signals with numbers below TRAIN_END / TRIED serve to develop."""
 
 
 def quiet_motion(kind: str, number: int) -> Motion:
