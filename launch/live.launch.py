@@ -20,7 +20,7 @@ ARGUMENTS = {
     "bag": ("", "MCAP file to record to; empty: do not record"),
     "namespace": ("", "namespace of all nodes and topics"),
     "sample_rate": ("51200", "Hz, of the simulated sensors"),
-    "channels": ("5", "number of simulated channels, 1 to 5"),
+    "channels": ("", "number of simulated channels in SI units, 1 to 5; empty: the operation's sensors in volts, or 5"),
     "seed": ("0", "seed of the simulated noise"),
 }
 
@@ -30,7 +30,7 @@ def nodes(context):
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     specs = with_matches(live_specs(
         Path(value["operation"]).read_text(encoding="utf-8"), value["bag"] or None, seed=int(value["seed"]),
-        sample_rate=float(value["sample_rate"]), channels=int(value["channels"])))
+        sample_rate=float(value["sample_rate"]), channels=int(value["channels"] or 0) or None))
     return [
         Node(executable=sys.executable, arguments=["-m", spec.kind.module], name=spec.name,
              namespace=value["namespace"], output="screen",

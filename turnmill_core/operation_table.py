@@ -145,10 +145,15 @@ def _sensor_rows(sensors: Sensors) -> Rows:
     rows: Rows = []
     for s in sensors.channels:
         factor, unit = _SENSITIVITY[s.kind]
-        shape = f", shape {100 * s.shape:.4g} %" if s.kind == "fibre probe" else ""
-        rows.append((s.name, f"{s.kind} along {s.direction}, {s.sensitivity * factor:.4g} {unit}, "
-                             f"{s.offset:g} V at zero, {s.lowest:g} to {s.highest:g} V{shape}"))
+        shape = f", shape {100 * s.shape:.4g} %" if s.kind == "fibre probe" or s.shape != 1 else ""
+        runout = f", runout {', '.join(f'{r * 1e6:.4g}' for r in s.runout)} um" if s.runout else ""
+        noise = "" if s.noise is None else f", noise {s.noise * 1e3:.4g} mV"
+        along = "" if s.kind == "microphone" else f" along {s.direction}"
+        rows.append((s.name, f"{s.kind}{along}, {s.sensitivity * factor:.4g} {unit}, {s.offset:g} V at zero, "
+                             f"{s.lowest:g} to {s.highest:g} V{shape}{runout}{noise}"))
     if sensors.fixture is not None:
         f = sensors.fixture
         rows.append(("fixture", f"{f.frequency:g} Hz, {100 * f.damping:g} %, {f.cross_talk * 1e6:.4g} um/N"))
+    if sensors.judged:
+        rows.append(("judged", sensors.judged))
     return rows

@@ -66,6 +66,8 @@ Density = Annotated[float, _Unit("kg/m^3", "positive")]
 Twist = Annotated[float, _Unit("rad/m")]
 Compliance = Annotated[float, _Unit("m/N", "positive")]
 Voltage = Annotated[float, _Unit("V")]
+Noise = Annotated[float, _Unit("V", "not negative")]
+Runout = Annotated[float, _Unit("m", "not negative")]
 
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

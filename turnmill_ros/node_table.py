@@ -134,17 +134,19 @@ CHANNELS = ("sound", "tool_x", "tool_y", "workpiece_x", "workpiece_y")
 
 
 def live_specs(
-    operation_text: str, bag: str | None, *, seed: int = 0, sample_rate: float = 51200.0, channels: int = 5,
+    operation_text: str, bag: str | None, *, seed: int = 0, sample_rate: float = 51200.0, channels: int | None = None,
     duration: float = 0.0,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a live run: simulated machine and process, predictions, monitor, and the recorder where a bag is named.
 
-    sample_rate [Hz]; channels: how many of CHANNELS; duration [s], 0: until it is stopped.
+    sample_rate [Hz]; channels: how many of CHANNELS, in SI units (None: the operation's sensors in volts, all of
+    CHANNELS where it has none); duration [s], 0: until it is stopped.
     """
     chosen: dict[str, dict[str, Any]] = {
         "operation_server": {"operation_text": operation_text},
         "controller": {"duration": float(duration)},
-        "process_simulator": {"seed": seed, "sample_rate": round(sample_rate), "channels": list(CHANNELS[:channels])},
+        "process_simulator": {"seed": seed, "sample_rate": round(sample_rate), "channels": list(CHANNELS[:channels]),
+                              "volts": channels is None},
         "force_predictor": {}, "stability_monitor": {}, "chatter_monitor": {}, "planner": {},
     }
     if bag is not None:

@@ -21,13 +21,14 @@ OnVerdict = Callable[[Verdict], None]
 
 def run_live(
     operation: Operation, *, duration: float | None = None, separate_processes: bool = False,
-    output: Path | None = None, sample_rate: float = 51200.0, channels: int = 5, seed: int = 0,
+    output: Path | None = None, sample_rate: float = 51200.0, channels: int | None = None, seed: int = 0,
     on_verdict: OnVerdict | None = None, stop: threading.Event | None = None,
 ) -> GraphResult:
     """Run simulated machine, process, predictions and monitor; record to `output`.
 
-    duration [s] (None: until Ctrl-C or `stop`); sample_rate [Hz]; channels: 1 to 5. Raises InputError where the
-    output exists, RecordingError or InputError where a node cannot do its work.
+    duration [s] (None: until Ctrl-C or `stop`); sample_rate [Hz]; channels: 1 to 5 in SI units (None: the operation's
+    sensors in volts, 5 where it has none). Raises InputError where the output exists, RecordingError or InputError
+    where a node cannot do its work.
     """
     if not operation.text:
         raise InputError(f"operation {operation.name!r} has no text to publish; read it from a file")

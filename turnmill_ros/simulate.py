@@ -47,14 +47,14 @@ class Simulated:
 
 def simulate_to_bag(
     op: Operation, path: str | Path, *, duration: float | None = None, sample_rate: float | None = None,
-    channels: int | Iterable[str] = 2, seed: int = 0, start_ns: int = START_NS, overwrite: bool = False,
+    channels: int | Iterable[str] | None = None, seed: int = 0, start_ns: int = START_NS, overwrite: bool = False,
     config: SimulationConfig | None = None, metadata: Mapping[str, Mapping[str, str]] | None = None,
     versions: Mapping[str, str] | None = None, progress: Callable[[float], None] | None = None,
 ) -> Simulated:
     """Simulate the operation's schedule and write the inputs of the suite to `path`, the truth to NAME.truth.json.
 
     duration [s] (None: the schedule's); sample_rate [Hz] (None: 12.8 kHz); channels: how many of CHANNELS, or
-    their names; config: replaces sample_rate, channels and start_ns; progress: called with the share done, 0 to
+    their names, in SI units (None: all sensors of the operation, in volts, or 2 where it has none); config: replaces sample_rate, channels and start_ns; progress: called with the share done, 0 to
     1. A block is recorded when its last sample is acquired, an axis state at its stamp, so a replay has the timing of
     the live machine.
 
@@ -87,14 +87,15 @@ def simulate_to_bag(
                      counts[SENSOR_BLOCKS.name] * config.block_samples / config.sample_rate, truth)
 
 
-def _config(sample_rate: float, channels: int | Iterable[str], start_ns: int) -> SimulationConfig:
+def _config(sample_rate: float, channels: int | Iterable[str] | None, start_ns: int) -> SimulationConfig:
     if sample_rate != round(sample_rate):
         raise ValueError(f"sample rate is {sample_rate} Hz, expected a whole number")
+    volts, channels = channels is None, 2 if channels is None else channels
     if isinstance(channels, int):
         if not 1 <= channels <= len(CHANNELS):
             raise ValueError(f"channels is {channels}, expected a number from 1 to {len(CHANNELS)}")
         channels = CHANNELS[:channels]
-    return SimulationConfig(sample_rate=round(sample_rate), channels=tuple(channels), start_ns=start_ns)
+    return SimulationConfig(sample_rate=round(sample_rate), channels=tuple(channels), start_ns=start_ns, volts=volts)
 
 
 class _InOrder:

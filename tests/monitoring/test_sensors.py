@@ -13,10 +13,7 @@ from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
 from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operation
 from turnmill_core.monitoring.sensors import (
     calibrate,
-    casing_motion,
     implausible,
-    measure,
-    probe_sees,
     shank_runout,
     tip_motion,
     without_runout,
@@ -26,6 +23,7 @@ from turnmill_core.operation_file import describe, parse_operation, shipped_oper
 from turnmill_core.operation_sensors import Fixture, Sensor, Sensors
 from turnmill_core.process.sensors import SoundModel
 from turnmill_core.process.simulation import SimulationConfig, simulate
+from turnmill_core.process.volts import casing_motion, measure, probe_sees
 
 RATE = 12800.0
 SECTION = """
@@ -74,6 +72,10 @@ def test_operation_file_holds_the_sensors() -> None:
     ("name: high_x", "name: low_x", "each name once"),
     ("lowest: -10 V", "lowest: 11 V", "highest"),
     ("kind: microphone", "kind: ear", "microphone"),
+    ("kind: dynamometer", "kind: dynamometer, shape: 20 %", "nothing else but an accelerometer"),
+    ("kind: microphone", "kind: microphone, runout: [1 um]", "fibre probe only"),
+    ("shape: 62 %", "shape: 62 %, noise: -1 mV", "voltage >= 0"),
+    ("  fixture:", "  judged: tip\n  fixture:", "judged"),
 ])
 def test_bad_sections_are_refused(old: str, new: str, told: str) -> None:
     with pytest.raises(ValueError, match=told):
@@ -125,10 +127,15 @@ def test_values_no_sensor_can_measure_are_told() -> None:
 def test_casing_moves_like_its_mode() -> None:
     fixture = Fixture(80.0, 0.06, 2e-8)
     t = np.arange(40000) / RATE
-    slow = casing_motion(fixture, np.full(len(t), 100.0), RATE)
+    slow, _ = casing_motion(fixture, np.full(len(t), 100.0), RATE)
     assert slow[-1] == pytest.approx(100 * 2e-8, rel=1e-3)
     for f in (40.0, 80.0, 300.0):
-        found = casing_motion(fixture, 100 * np.cos(2 * math.pi * f * t), RATE)[-12800:]
+        force = 100 * np.cos(2 * math.pi * f * t)
+        whole, _ = casing_motion(fixture, force, RATE)
+        first, state = casing_motion(fixture, force[:5000], RATE)
+        rest, _ = casing_motion(fixture, force[5000:], RATE, state)
+        assert np.array_equal(np.concatenate([first, rest]), whole)
+        found = whole[-12800:]
         r = f / 80.0
         expected = 100 * 2e-8 / math.hypot(1 - r**2, 2 * 0.06 * r)
         assert found.std() * math.sqrt(2) == pytest.approx(expected, rel=5e-3)
@@ -148,7 +155,7 @@ def cut():
 def probes_see(op, tip, force, turns, gain: float = 1.0):
     """Volts of the four probes: out-of-round shank, 80 Hz casing, 50 nm of noise; and the casing's motion."""
     rng = np.random.default_rng(5)
-    casing = np.stack([casing_motion(op.sensors.fixture, force[:, k], RATE) for k in range(2)], axis=1)
+    casing = np.stack([casing_motion(op.sensors.fixture, force[:, k], RATE)[0] for k in range(2)], axis=1)
     volts = []
     for k, sensor in enumerate(op.sensors.channels[:4]):
         axis = k // 2
@@ -165,16 +172,19 @@ def test_tip_orbit_from_probe_pairs_with_runout_and_cross_talk(cut) -> None:
     seen = calibrate(op.sensors, block(volts, names)).samples.astype(np.float64)
     air = slice(0, round(0.8 * RATE))
     seen = without_runout(seen, turns, shank_runout(seen[air], turns[air]))
-    found, shook = tip_motion(op.sensors.channels[:4], seen, RATE, op.sensors.fixture)
+    pairs = [tip_motion(op.sensors, axis, seen[:, 2 * k: 2 * k + 2], RATE) for k, axis in enumerate("xy")]
+    found, shook = (np.stack([pair[k] for pair in pairs], axis=1) for k in range(2))
     in_cut = slice(round(1.6 * RATE), None)
     assert casing[in_cut].std() > 0.05 * tip[in_cut].std()
     error = np.linalg.norm(found[in_cut] - tip[in_cut], axis=1)
     size = np.linalg.norm(tip[in_cut] - tip[in_cut].mean(axis=0), axis=1)
     assert np.sqrt(np.mean(error**2)) < 0.05 * np.sqrt(np.mean(size**2))
     assert np.sqrt(np.mean((shook - casing)[in_cut] ** 2)) < 0.2 * casing[in_cut].std() + 2e-7
-    single = replace(op.sensors.channels[0]), op.sensors.channels[2]
-    alone, _ = tip_motion(single, seen[:, [0, 2]], RATE, None)
-    assert np.linalg.norm(alone[in_cut] - tip[in_cut]) > np.linalg.norm(found[in_cut] - tip[in_cut])
+    rigid = Sensors(op.sensors.channels)
+    alone, _ = tip_motion(rigid, "x", seen[:, :2], RATE)
+    assert np.linalg.norm(alone[in_cut] - tip[in_cut, 0]) > np.linalg.norm((found - tip)[in_cut, 0])
+    with pytest.raises(ValueError, match="4 whole ones"):
+        shank_runout(seen[: round(0.05 * RATE)], turns[: round(0.05 * RATE)])
 
 
 def test_saturated_probes_are_flagged_where_the_orbit_is_wrong(cut) -> None:
@@ -194,11 +204,16 @@ def test_saturated_probes_are_flagged_where_the_orbit_is_wrong(cut) -> None:
 def test_probes_that_cannot_tell_are_refused() -> None:
     probe = Sensor("a", "fibre probe", 5800.0, 0.5, 4.5, 2.5, "x", 0.5)
     with pytest.raises(ValueError, match="along y"):
-        tip_motion([probe], np.zeros((4, 1)), RATE, None)
-    same = [probe, replace(probe, name="b"), replace(probe, name="c", direction="y")]
+        tip_motion(Sensors((probe,)), "y", np.zeros((4, 1)), RATE)
+    same = Sensors((probe, replace(probe, name="b")), Fixture(80.0, 0.06, 2e-8))
     with pytest.raises(ValueError, match="differ by 5 %"):
-        tip_motion(same, np.zeros((4, 3)), RATE, Fixture(80.0, 0.06, 2e-8))
-    with pytest.raises(ValueError, match="at least 10"):
-        shank_runout(np.zeros((100, 1)), np.linspace(0, 5, 100))
+        tip_motion(same, "x", np.zeros((4, 2)), RATE)
     with pytest.raises(ValueError, match="each name once"):
         Sensors((probe, probe))
+    with pytest.raises(ValueError, match="found from the fibre probes"):
+        replace(probe, name="tip_x")
+    with pytest.raises(ValueError, match="judged sensor is 'b'"):
+        Sensors((probe,), judged="b")
+    with pytest.raises(ValueError, match="along y"):
+        Sensors((probe,), judged="tip_y")
+    assert Sensors((probe,), judged="tip_x").probes("x") == (probe,)

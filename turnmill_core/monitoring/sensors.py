@@ -6,22 +6,21 @@ the shank, its out-of-roundness, and its own casing:
     s_i = shape_i u_tip + runout_i(angle) - c,     volts = offset + sensitivity s
 
 Two probes in one direction at places of different mode shape tell the tip's vibration u_tip and the casing's motion c
-apart (thesis 4.3.7.3: two pairs on the shank, a fixture of 80 Hz); one probe takes c for zero.
+apart (thesis 4.3.7.3: two pairs on the shank, a fixture of 80 Hz); without a fixture c is zero.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
-from scipy.linalg import expm
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
-from turnmill_core.operation_sensors import MEASURED, Fixture, Sensor, Sensors
+from turnmill_core.operation_sensors import MEASURED, Fixture, Sensors
 
 Floats = NDArray[np.float64]
 
@@ -61,49 +60,16 @@ def calibrate(sensors: Sensors, block: SensorBlock) -> SensorBlock:
     return replace(block, channels=tuple(channels), samples=samples)
 
 
-def measure(sensor: Sensor, value: Floats) -> NDArray[np.float32]:
-    """Volts that a sensor gives for the value (n,) that it measures, in SI units; clipped to its linear range."""
-    volts = np.clip(sensor.offset + sensor.sensitivity * value, sensor.lowest, sensor.highest)
-    return volts.astype(np.float32)
-
-
-def probe_sees(sensor: Sensor, tip: Floats, runout: Floats, casing: Floats) -> Floats:
-    """Displacement [m] that a fibre probe sees (n,): of the shank, with its out-of-roundness, less that of its casing.
-
-    tip, runout, casing (n,) [m], in the direction of the probe.
-    """
-    return sensor.shape * tip + runout - casing
-
-
-def casing_motion(fixture: Fixture, force: Floats, rate: float) -> Floats:
-    """Motion of the probes' casing [m] (n,) under the cutting force (n,) [N] at `rate` [Hz], in one direction.
-
-    One mode from rest, exact for a force that is linear between the samples.
-    """
-    w, zeta = 2 * math.pi * fixture.frequency, fixture.damping
-    system = np.zeros((4, 4))
-    system[0, 1] = 1.0
-    system[1, :3] = -(w**2), -2 * zeta * w, w**2
-    system[2, 3] = 1.0
-    flow = expm(system / rate)
-    a = flow[:2, :2]
-    late = flow[:2, 3] * rate
-    early = flow[:2, 2] - late
-    # x[n+1] = a x[n] + early f[n] + late f[n+1]; its transfer function to the displacement:
-    poles = [1.0, -float(np.trace(a)), float(np.linalg.det(a))]
-    zeros = [late[0], early[0] - a[1, 1] * late[0] + a[0, 1] * late[1], a[0, 1] * early[1] - a[1, 1] * early[0]]
-    found: Floats = fixture.cross_talk * signal.lfilter(zeros, poles, force)
-    return found
-
-
 def shank_runout(displacement: Floats, turns: Floats, points: int = 256) -> Floats:
-    """Out-of-roundness (points, k) that probes see while the tool turns in air: mean by angle.
+    """Out-of-roundness (points, k) that probes see while the tool turns in air: mean by angle over whole revolutions.
 
-    displacement (n, k) [m]; turns (n,): revolutions at the samples. Raises ValueError below ten revolutions.
+    displacement (n, k) [m]; turns (n,): revolutions at the samples. Raises ValueError below four whole ones.
     """
-    if turns[-1] - turns[0] < 10:
-        raise ValueError(f"air lasts {turns[-1] - turns[0]:.3g} revolutions, expected at least 10")
-    at = np.arange(math.ceil(turns[0]) * points, math.floor(turns[-1]) * points) / points
+    first, last = math.ceil(turns[0]), math.floor(turns[-1])
+    if last - first < FEWEST_TURNS:
+        raise ValueError(f"air lasts {turns[-1] - turns[0]:.3g} revolutions, expected at least {FEWEST_TURNS} whole "
+                         "ones")
+    at = np.arange(first * points, last * points) / points
     rows = np.stack([np.interp(at, turns, column) for column in displacement.T], axis=1)
     found: Floats = rows.reshape(-1, points, displacement.shape[1]).mean(axis=0)
     return found
@@ -118,32 +84,32 @@ def without_runout(displacement: Floats, turns: Floats, runout: Floats) -> Float
     return found
 
 
-def tip_motion(probes: Sequence[Sensor], displacement: Floats, rate: float,
-               fixture: Fixture | None) -> tuple[Floats, Floats]:
-    """Vibration of the tool tip and motion of the casing (n, 2) [m], x and y of the tool frame, by mode shape.
+def tip_motion(sensors: Sensors, axis: str, displacement: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Vibration of the tool tip and motion of the casing (n,) [m] along one axis of the tool frame, by mode shape.
 
-    probes (k): fibre probes, at least one in each of x and y; displacement (n, k) [m] at `rate` [Hz], calibrated and
-    without runout. With a fixture, two or more probes in a direction tell tip and casing apart; the casing's motion
-    is that below STIFF_ABOVE times the natural frequency of the fixture, above which its inertia keeps it at rest, so
-    that the probes' noise counts little there. Without a fixture the casing is at rest. Raises ValueError
-    where a direction has no probe, or, with a fixture, only one or only probes of one shape.
+    displacement (n, k) [m] at `rate` [Hz] of the probes of ``sensors.probes(axis)``, calibrated and without runout.
+    With a fixture, two or more probes tell tip and casing apart; the casing's motion is that below STIFF_ABOVE
+    times the natural frequency of the fixture, above which its inertia keeps it at rest, so that the probes' noise
+    counts little there. Without a fixture the casing is at rest. Raises ValueError where the probes cannot tell.
     """
-    tip, casing = (np.zeros((len(displacement), 2)) for _ in range(2))
-    for column, axis in enumerate(("x", "y")):
-        at = [k for k, p in enumerate(probes) if p.direction == axis and p.kind == "fibre probe"]
-        if not at:
-            raise ValueError(f"no fibre probe looks along {axis}, expected at least one in each of x and y")
-        shapes, seen = np.array([probes[k].shape for k in at]), displacement[:, at]
-        if fixture is not None:
-            if np.ptp(shapes) < 0.05 * shapes.max():
-                raise ValueError(f"shape of the probes along {axis} is {shapes.tolist()}, expected values that differ "
-                                 "by 5 % or more: probes at one height cannot tell the tool from the casing")
-            both = seen @ np.linalg.pinv(np.stack([shapes, -np.ones(len(at))], axis=1)).T
-            low = signal.butter(4, min(STIFF_ABOVE * fixture.frequency, 0.45 * rate), fs=rate, output="sos")
-            casing[:, column] = signal.sosfiltfilt(low, both[:, 1])
-        tip[:, column] = (seen + casing[:, [column]]) @ shapes / np.sum(shapes**2)
+    shapes = np.array([p.shape for p in sensors.probes(axis)])
+    casing: Floats = np.zeros(len(displacement))
+    if sensors.fixture is not None:
+        inverse = np.linalg.pinv(np.stack([shapes, -np.ones(len(shapes))], axis=1))
+        casing = signal.sosfiltfilt(_low_pass(sensors.fixture, rate), displacement @ inverse[1])
+    tip: Floats = (displacement + casing[:, None]) @ shapes / np.sum(shapes**2)
     return tip, casing
 
+
+@lru_cache(maxsize=16)
+def _low_pass(fixture: Fixture, rate: float) -> Floats:
+    """Second-order sections that keep what a fixture moves by."""
+    found: Floats = signal.butter(4, min(STIFF_ABOVE * fixture.frequency, 0.45 * rate), fs=rate, output="sos")
+    return found
+
+
+FEWEST_TURNS = 4
+"""Whole revolutions of air from which a shank's runout is learned at least."""
 
 STIFF_ABOVE = 4.0
 """Multiple of its natural frequency above which a fixture moves by less than a fifteenth of its static displacement."""

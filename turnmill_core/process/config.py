@@ -13,13 +13,14 @@ from turnmill_core.process.sensors import CHANNELS, SoundModel
 class SimulationConfig:
     """How a cut is simulated and what is measured.
 
-    sample_rate [Hz] of all channels, an integer; channels: names from sensors.CHANNELS; oversampling:
+    sample_rate [Hz] of all channels, an integer; channels: names from sensors.CHANNELS, in SI units; oversampling:
     integration steps per sample (0: enough for 100 kHz); block_duration [s]; axes_rate [Hz] of
     the axis states that `simulate` makes; slices along the tool axis (0: one per 0.02 rad of helix
     lag at the largest depth, at most 32); displacement_noise [m rms], force_noise [N rms], white;
     loss_of_contact: the tool can leave the material (False: the linear cut, to compare with); truth:
     tell the truth (False: an empty one, which is faster); sound: the sound model; start_ns: stamp of
-    the first sample of `simulate`; device, stream_id: of the blocks.
+    the first sample of `simulate`; device, stream_id: of the blocks; volts: measure with all sensors of the
+    operation, in volts, in place of `channels`, where the operation has sensors.
     """
 
     sample_rate: int = 12800
@@ -36,6 +37,7 @@ class SimulationConfig:
     start_ns: int = 0
     device: str = "simulated"
     stream_id: int = 1
+    volts: bool = False
 
     def __post_init__(self) -> None:
         require(self.sample_rate >= 100, "sample rate", self.sample_rate, "Hz", "an integer >= 100")

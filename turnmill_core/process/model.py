@@ -16,10 +16,12 @@ from turnmill_core.cutting.tool import require_cylinder
 from turnmill_core.machine.axes import AXES, AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, machine_from_tool
 from turnmill_core.operation import RIGID, Conditions, Mode, Operation, Structure, require
+from turnmill_core.operation_sensors import NO_SENSORS, Sensors
 from turnmill_core.process._kernels import integrator
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.sensors import SoundModel, antialias_taps
 from turnmill_core.process.truth import principal_turns
+from turnmill_core.process.volts import signals_of
 from turnmill_core.stability.threads import one_thread
 from turnmill_core.structure.at import plain_structures
 from turnmill_core.structure.complex_modes import checked_phases
@@ -33,6 +35,8 @@ MOST_SLICES = 32
 ARCS = 3
 GENERAL_SLICES = 24  # where the engagement differs from height to height
 TRUTH_HOP = 0.03  # s, about
+SIGNALS = (*integrator.RAW, *(f"tool_acceleration_{axis}" for axis in "xyz"))
+"""Raw signals: those of the integrator, and mean accelerations of the tool over each step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +48,8 @@ class ProcessModel:
     coefficients (8,): Ktc, Krc, Kac [Pa], Kte, Kre, Kae per height instead of per edge length [N/m], process damping
     per height times the tool's speed [N/m2] and its friction [1]; slices, cells of the surface; taps: anti-alias
     filter; columns: of the raw signals, one per channel; teeth; turns: tool revolutions in a principal period;
-    uneven: the teeth are not equally spaced; hop: principal periods from one window of the truth to the next.
+    uneven: the teeth are not equally spaced; hop: principal periods from one window of the truth to the next;
+    names: of the measured signals, one per column; sensors: that measure them in volts (none: in SI units).
     """
 
     op: Operation
@@ -63,11 +68,23 @@ class ProcessModel:
     turns: int
     uneven: bool
     hop: int
+    names: tuple[str, ...]
+    sensors: Sensors
 
     @property
     def raw_columns(self) -> int:
-        """Columns of the raw signals that are computed: velocities only where a channel asks for them."""
+        """Columns of the raw signals that are integrated: velocities only where a channel asks for them."""
         return len(integrator.RAW) if max(self.columns) >= integrator.FIRST_VELOCITY else integrator.FIRST_VELOCITY
+
+    @property
+    def accelerates(self) -> bool:
+        """Whether the acceleration of the tool is measured; its columns follow those of the velocity."""
+        return max(self.columns) >= len(integrator.RAW)
+
+    @property
+    def row_columns(self) -> int:
+        """Columns of the raw signals."""
+        return len(SIGNALS) if self.accelerates else self.raw_columns
 
 
 def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
@@ -83,6 +100,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
     flank = op.process_damping
     damping = (flank.coefficient(1.0) / tool.radius, flank.friction) if flank else (0.0, 0.0)
     dt = 1.0 / (config.sample_rate * config.ratio)
+    sensors = op.sensors if config.volts else NO_SENSORS
+    names = signals_of(sensors) or config.channels
     pitch = np.array(tool.pitch)
     lag_per_depth = 2 * math.tan(tool.helix_angle) / tool.diameter
     edge = np.array([material.Kte, material.Kre, material.Kae]) / math.cos(tool.helix_angle)
@@ -101,8 +120,8 @@ def process_model(op: Operation, config: SimulationConfig) -> ProcessModel:
         slices=config.slices or min(MOST_SLICES, max(GENERAL_SLICES if op.eccentricity else 1,
                                                      math.ceil(lag / LAG_PER_SLICE))),
         cells=int(np.clip(round(2 * math.pi / (min(speeds, default=100.0) * dt)), 360, 16384)),
-        taps=antialias_taps(config.ratio), columns=tuple(integrator.RAW.index(name) for name in config.channels),
-        teeth=tool.teeth, turns=principal_turns(tool),
+        taps=antialias_taps(config.ratio), columns=tuple(SIGNALS.index(name) for name in names),
+        names=names, sensors=sensors, teeth=tool.teeth, turns=principal_turns(tool),
         uneven=bool(np.ptp(pitch) > 1e-9),
         hop=max(1, round(TRUTH_HOP * op.conditions.tool_speed / (2 * math.pi * principal_turns(tool)))),
     )

@@ -32,6 +32,7 @@ from turnmill_core.process.engagement_path import steady_engagement
 from turnmill_core.process.model import ARCS, GENERAL_SLICES, ProcessModel, general_engagement, knot, process_model
 from turnmill_core.process.sensors import CHANNELS, ambient_sound, white_noise
 from turnmill_core.process.truth import MARKS_PER_TURN, Truth, join_truth, truth_of_marks
+from turnmill_core.process.volts import channels_of, volts
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ class SimulationState:
     force (5,), scalars (5,), surface (teeth, slices, cells, 2): see integrator.advance; rows: raw signals
     that the anti-alias filter still needs; next_sample: the sample that they centre on; samples: measured
     but not yet in a block; next_block: index of the block's first sample; background: last value of the
-    noise filter; marks: displacements that the truth still needs, from the mark with index `mark_count` on.
+    noise filter; casing (3, 2): motion of the probes' fixture; marks: displacements that the truth still needs.
     """
 
     model: ProcessModel
@@ -65,6 +66,7 @@ class SimulationState:
     samples: NDArray[np.float32]
     next_block: int
     background: float
+    casing: Floats
     marks: Floats
     first_mark_skip: int
 
@@ -98,9 +100,9 @@ def initial(op: Operation, config: SimulationConfig, seed: int, modal: Floats | 
         model=model, seed=seed, steps=0, base_ns=0, knot=np.zeros((0, integrator.KNOT_COLUMNS)),
         arcs=np.zeros((0, model.slices, ARCS, 2)), modal=start,
         force=np.zeros(integrator.LOADS), scalars=np.zeros(integrator.SCALARS), surface=surface,
-        rows=np.zeros((half, model.raw_columns)), next_sample=0,
-        samples=np.zeros((0, len(config.channels)), dtype=np.float32), next_block=0, background=0.0,
-        marks=np.zeros((0, 4)), first_mark_skip=-1,
+        rows=np.zeros((half, model.row_columns)), next_sample=0,
+        samples=np.zeros((0, len(model.sensors.channels or config.channels)), dtype=np.float32), next_block=0,
+        background=0.0, casing=np.zeros((3, 2)), marks=np.zeros((0, 4)), first_mark_skip=-1,
     )
 
 
@@ -183,7 +185,7 @@ def _begin(state: SimulationState, first: Floats, base_ns: int) -> SimulationSta
     """State at the first axis state: angles set, one row of raw signals at time 0."""
     next_mark = math.floor(first[integrator.TOOL_ANGLE] * MARKS_PER_TURN / (2 * math.pi)) + 1
     scalars = np.array([first[integrator.TOOL_ANGLE], 0.0, max(0.0, first[integrator.DEPTH]), 0.0, next_mark])
-    row = np.zeros((1, state.model.raw_columns))
+    row = np.zeros((1, state.model.row_columns))
     row[0, 0] = first[integrator.TOOL_ANGLE]
     modes = state.model.modes
     for side, column in ((1.0, 2), (-1.0, 5)):
@@ -206,7 +208,7 @@ def _integrate(
     while end * dt > last:
         end -= 1
     count = max(0, end - state.steps) if len(knots) > 1 else 0
-    raw = np.empty((count, state.rows.shape[1]))
+    raw = np.empty((count, model.raw_columns))
     turned = float(knots[:, integrator.TOOL_ANGLE].max() - state.scalars[integrator.ANGLE])
     marks = np.empty((int(max(0.0, turned) * MARKS_PER_TURN / (2 * math.pi)) + count + 2, 4))
     modal, force, scalars, surface = (a.copy() for a in (state.modal, state.force, state.scalars, state.surface))
@@ -216,6 +218,10 @@ def _integrate(
             state.steps, dt, knots, arcs, model.modes, model.tooth_angle, model.pitch, model.runout, model.shape,
             model.coefficients, config.loss_of_contact, modal, force, scalars, surface, raw, MARKS_PER_TURN, marks,
         )
+    if model.accelerates:
+        speeds = slice(integrator.FIRST_VELOCITY, integrator.FIRST_VELOCITY + 3)
+        gained = np.diff(np.concatenate([state.rows[-1:, speeds], raw[:, speeds]]), axis=0)
+        raw = np.concatenate([raw, gained / dt], axis=1)
     advanced = replace(state, steps=state.steps + count, knot=knots[-1:], arcs=arcs[-1:], modal=modal, force=force,
                        scalars=scalars, surface=surface, rows=np.concatenate([state.rows, raw]))
     return advanced, marks[:written]
@@ -232,6 +238,7 @@ def _finish_chunk(
     state = replace(state, marks=rest, first_mark_skip=state.first_mark_skip - skipped)
     state = _measure(config, state)
     size = config.block_samples
+    measured = channels_of(state.model.sensors) or tuple(CHANNELS[name] for name in config.channels)
     blocks: list[SensorBlock] = []
     samples = state.samples
     while len(samples) >= size:
@@ -239,7 +246,7 @@ def _finish_chunk(
         blocks.append(SensorBlock(
             stamp_ns=state.base_ns + round(first * 1e9 / config.sample_rate), device=config.device,
             stream_id=config.stream_id, first_sample=first, sample_rate=float(config.sample_rate),
-            channels=tuple(CHANNELS[name] for name in config.channels), samples=samples[:size].copy(),
+            channels=measured, samples=samples[:size].copy(),
         ))
         samples = samples[size:]
     state = replace(state, samples=samples, next_block=state.next_block + len(blocks) * size)
@@ -261,17 +268,21 @@ def _measure(config: SimulationConfig, state: SimulationState) -> SimulationStat
     phases = np.ascontiguousarray(used.reshape(len(model.columns), length, ratio).transpose(0, 2, 1))
     filtered = np.empty((len(model.columns), count))
     decimate(phases, model.taps, filtered)
-    signals = filtered.T.copy()
-    background = state.background
-    for c, name in enumerate(config.channels):
-        if name == "sound":
-            angle = state.rows[width // 2 :: ratio, 0][:count]
-            ambient, background = ambient_sound(config.sound, state.seed, state.next_sample, float(config.sample_rate),
-                                                angle, background)
-            signals[:, c] += ambient
-        else:
+    background, casing = state.background, state.casing
+    angle = state.rows[width // 2 :: ratio, 0][:count]
+    if "sound" in model.names:
+        ambient, background = ambient_sound(config.sound, state.seed, state.next_sample, float(config.sample_rate),
+                                            angle, background)
+        filtered[model.names.index("sound")] += ambient
+    if model.sensors.channels:
+        samples, casing = volts(model.sensors, dict(zip(model.names, filtered, strict=True)), angle,
+                                float(config.sample_rate), state.seed, state.next_sample, casing)
+    else:
+        for c, name in enumerate(model.names):
             level = {"force": config.force_noise, "displacement": config.displacement_noise}.get(
                 CHANNELS[name].quantity, 0.0)
-            signals[:, c] += level * white_noise(state.seed, 1 + list(CHANNELS).index(name), state.next_sample, count)
+            if name != "sound":
+                filtered[c] += level * white_noise(state.seed, 1 + list(CHANNELS).index(name), state.next_sample, count)
+        samples = filtered.T.astype(np.float32)
     return replace(state, rows=state.rows[count * ratio :], next_sample=state.next_sample + count,
-                   background=background, samples=np.concatenate([state.samples, signals.astype(np.float32)]))
+                   background=background, casing=casing, samples=np.concatenate([state.samples, samples]))

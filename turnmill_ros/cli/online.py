@@ -123,7 +123,8 @@ def live(
     separate: Annotated[bool, typer.Option("--separate-processes", help="Each node in its own process.")] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="BAG", help="Record everything.")] = None,
     sample_rate: Annotated[str, typer.Option(help="Sample rate of the sensors.")] = "51.2 kHz",
-    channels: Annotated[int, typer.Option(help="Number of sensor channels.")] = 5,
+    channels: Annotated[int | None, typer.Option(
+        help="Number of channels in SI units; default: the operation's sensors in volts, 5 where it has none.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     dashboard: Annotated[int | None, typer.Option(
         metavar="PORT", help="Show it meanwhile at http://127.0.0.1:PORT/.")] = None,
@@ -153,7 +154,7 @@ def live(
             output=out,
             separate_processes=separate,
             sample_rate=quantity(sample_rate, "Hz", "--sample-rate"),
-            channels=whole(channels, "--channels", 1, 5),
+            channels=None if channels is None else whole(channels, "--channels", 1, 5),
             seed=whole(seed, "--seed", 0),
             on_verdict=None if as_json else _tell_changes(),
         )

@@ -35,7 +35,9 @@ def simulate(
     op_name: OperationArgument, output: OutputOption,
     duration: Annotated[str | None, typer.Option(help="How long, e.g. 10s; default: the operation's schedule.")] = None,
     sample_rate: Annotated[str, typer.Option(help="Sample rate of the sensors, e.g. 12.8kHz.")] = "12.8 kHz",
-    channels: Annotated[int, typer.Option(help="Sound; then displacement of tool x, y, workpiece x, y.")] = 2,
+    channels: Annotated[int | None, typer.Option(
+        help="In SI units: 1 sound, 2 to 5 displacement of tool x, y, workpiece x, y too; default: the operation's "
+             "sensors in volts, 2 where it has none.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     changes: SetOption = None, as_json: JsonFlag = False,
 ) -> None:
@@ -54,7 +56,7 @@ def simulate(
             output,
             duration=quantity(duration, "s", "--duration"),
             sample_rate=quantity(sample_rate, "Hz", "--sample-rate"),
-            channels=whole(channels, "--channels", 1, 5),
+            channels=None if channels is None else whole(channels, "--channels", 1, 5),
             seed=whole(seed, "--seed", 0),
             progress=advance,
         )

@@ -20,7 +20,8 @@ from turnmill_ros.parameters import Setting, declare, declare_config
 
 SETTINGS = {
     "sample_rate": Setting("Hz, of every channel", 1000, 204800),
-    "channels": Setting("names of the channels to measure"),
+    "channels": Setting("names of the channels to measure, in SI units"),
+    "volts": Setting("measure with the operation's sensors, in volts, instead of the channels, where it has sensors"),
     "oversampling": Setting("integration steps for each sample; 0: enough for 100 kHz", 0, 64),
     "slices": Setting("slices along the tool axis; 0: chosen by the helix", 0, 256),
     "block_duration": Setting("s, length of a block", 0.01, 0.05),
