@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import ndimage
+from scipy import ndimage, signal
 
 from turnmill_core.monitoring import _kernels
 
@@ -21,6 +21,52 @@ def test_spline_is_that_of_scipy_at_the_angles() -> None:
     assert places == pytest.approx(expected, abs=1e-9)
     assert values == pytest.approx(ndimage.map_coordinates(x, expected[None, :], order=3, mode="mirror"), abs=1e-9)
     assert np.allclose(_kernels.spline_at.py_func(*arguments), (values, places), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "up", "down"), [(400, 1, 2), (300, 2, 1), (250, 3, 2), (200, 2, 3), (7, 1, 3)])
+def test_resampling_is_that_of_scipy(count: int, up: int, down: int) -> None:
+    x, taps = RNG.standard_normal(count), signal.firwin(41, 0.3 / max(up, down))
+    found = _kernels.resampled(x, taps, up, down)
+    assert found == pytest.approx(signal.resample_poly(x, up, down, window=taps), abs=1e-12)
+    assert np.allclose(_kernels.resampled.py_func(x, taps, up, down), found, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 200])
+def test_spline_coefficients_are_those_of_scipy(count: int) -> None:
+    x = RNG.standard_normal(count)
+    found = _kernels.spline_coefficients(x)
+    assert found == pytest.approx(ndimage.spline_filter1d(x, 3, mode="mirror"), abs=1e-12)
+    assert np.allclose(_kernels.spline_coefficients.py_func(x), found, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, 80])
+def test_upper_median_has_its_rank(count: int) -> None:
+    for kernel in (_kernels.upper_median, _kernels.upper_median.py_func):
+        for values in (RNG.standard_normal(count), RNG.integers(0, 3, count).astype(float)):
+            expected = np.sort(values)[count // 2]
+            assert kernel(values) == expected
+
+
+@pytest.mark.parametrize(("count", "block"), [(400, 40), (97, 40), (30, 40)])
+def test_block_medians_are_joined_by_straight_lines(count: int, block: int) -> None:
+    power = RNG.standard_exponential(count)
+    blocks, size = max(1, count // block), min(block, count)
+    medians = np.sort(power[: blocks * size].reshape(blocks, size), axis=1)[:, size // 2]
+    expected = np.interp(np.arange(count), (np.arange(blocks) + 0.5) * block, medians)
+    assert _kernels.block_medians(power, block) == pytest.approx(expected)
+    assert _kernels.block_medians.py_func(power, block) == pytest.approx(expected)
+
+
+def test_strongest_peaks_take_their_lobes() -> None:
+    power, floor = np.full(60, 1.0), np.full(60, 0.5)
+    power[[3, 20, 22, 40]] = 90.0, 50.0, 60.0, 70.0
+    power[41] = 8.0
+    for kernel in (_kernels.strongest_peaks, _kernels.strongest_peaks.py_func):
+        bins, energy = kernel(power, floor, 5, 16.0, 9, 3)
+        assert bins.tolist() == [40, 22]
+        assert energy == pytest.approx([69.5 + 7.5 + 5 * 0.5, 59.5 + 49.5 + 5 * 0.5])
+        assert kernel(power, floor, 0, 16.0, 1, 3)[0].tolist() == [3]
+        assert len(kernel(power, floor, 41, 16.0, 9, 3)[0]) == 0
 
 
 def test_row_fits_are_least_squares() -> None:

@@ -33,6 +33,58 @@ def kalman_comb(x: Floats, turns: Floats, harmonics: int, gain: float) -> Floats
 
 
 @njit(cache=True)
+def resampled(x: Floats, taps: Floats, up: int, down: int) -> Floats:
+    """x (n,) at up / down of its rate, zero beyond its ends, through symmetric `taps` (low-pass at the raised rate).
+
+    As scipy.signal.resample_poly, sample 0 on sample 0. The signal is split into its `down` phases, so that the inner
+    loops run over neighbours.
+    """
+    half, per = (len(taps) - 1) // 2, -(-len(x) // down)
+    phases = np.zeros((down, per))
+    for k in range(len(x)):
+        phases[k % down, k // down] = x[k]
+    out = np.zeros(-(-len(x) * up // down))
+    for p in range(up):
+        row = np.zeros(-(-(len(out) - p) // up))
+        for t in range(len(taps)):
+            at = p * down + half - t
+            if at % up == 0:
+                first, tap = at // up, up * taps[t]
+                source, shift = phases[first % down], first // down
+                low, high = max(0, -shift), min(len(row), per - shift)
+                target, given = row[low:high], source[low + shift: high + shift]
+                for k in range(high - low):
+                    target[k] += tap * given[k]
+        out[p::up] = row
+    return out
+
+
+POLE = 3.0**0.5 - 2.0
+
+
+@njit(cache=True)
+def spline_coefficients(x: Floats) -> Floats:
+    """Coefficients (n,) of the cubic B-spline through samples x (n,), n > 1, mirrored at its ends.
+
+    Two recursions (Unser 1999, Fig. 8); the mirrored sum that starts the first is cut off where it is below rounding.
+    """
+    count = len(x)
+    c = 6.0 * x
+    total, power = c[0], POLE
+    for k in range(1, 40):
+        place = k % (2 * count - 2)
+        total += power * c[min(place, 2 * count - 2 - place)]
+        power *= POLE
+    c[0] = total
+    for k in range(1, count):
+        c[k] += POLE * c[k - 1]
+    c[count - 1] = POLE / (POLE * POLE - 1.0) * (c[count - 1] + POLE * c[count - 2])
+    for k in range(count - 2, -1, -1):
+        c[k] = POLE * (c[k + 1] - c[k])
+    return c
+
+
+@njit(cache=True)
 def spline_at(coefficients: Floats, turns: Floats, start: float, step: float, count: int) -> tuple[Floats, Floats]:
     """Cubic spline and its places at `count` equal angles: start + (k + 1) step revolutions.
 
@@ -111,3 +163,79 @@ def family_sums(frequency: Floats, energy: Floats, first: float, tooth: float, s
         if member or distance(frequency[k], first, spindle) <= tolerance:
             explained += energy[k]
     return own, multiples, explained
+
+
+@njit(cache=True)
+def upper_median(values: Floats) -> float:
+    """The element of rank len(values) // 2 from 0, by quickselect; `values` is reordered."""
+    low, high, rank = 0, len(values) - 1, len(values) // 2
+    while low < high:
+        pivot, i, j = values[(low + high) // 2], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while pivot < values[j]:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if rank <= j:
+            high = j
+        elif rank >= i:
+            low = i
+        else:
+            break
+    return float(values[rank])
+
+
+@njit(cache=True)
+def block_medians(power: Floats, block: int) -> Floats:
+    """Medians of the whole blocks of `power` (n,), joined by straight lines between the blocks' middles (n,)."""
+    count, size = max(1, len(power) // block), min(block, len(power))
+    medians = np.empty(count)
+    for b in range(count):
+        medians[b] = upper_median(power[b * size: (b + 1) * size].copy())
+    floor = np.empty(len(power))
+    for k in range(len(power)):
+        place = min(max(k / block - 0.5, 0.0), count - 1.0)
+        i = min(int(place), max(0, count - 2))
+        floor[k] = medians[i]
+        if count > 1:
+            floor[k] += (place - i) * (medians[i + 1] - medians[i])
+    return floor
+
+
+@njit(cache=True)
+def strongest_peaks(power: Floats, floor: Floats, lowest: int, ratio: float, most: int,
+                    lobe: int) -> tuple[NDArray[np.int64], Floats]:
+    """Bins of the `most` strongest peaks of `power` (n,) from bin `lowest` on and above `ratio` times the floor (n,).
+
+    Strongest first, each with its energy: what its main lobe, `lobe` bins on either side, holds above the floor and no
+    stronger peak has taken. A peak in the lobe of a stronger one is part of it.
+    """
+    at = np.empty(len(power), dtype=np.int64)
+    count = 0
+    for k in range(max(1, lowest), len(power) - 1):
+        p = power[k]
+        if p > ratio * floor[k] and p > power[k - 1] and p >= power[k + 1]:
+            at[count] = k
+            count += 1
+    taken = np.zeros(len(power), dtype=np.bool_)
+    bins, energy = np.empty(most, dtype=np.int64), np.empty(most)
+    found = 0
+    while found < most:
+        best = -1
+        for i in range(count):
+            if not taken[at[i]] and (best < 0 or power[at[i]] > power[best]):
+                best = at[i]
+        if best < 0:
+            break
+        total = 0.0
+        for k in range(max(0, best - lobe), min(len(power), best + lobe + 1)):
+            if not taken[k]:
+                total += power[k] - floor[k]
+                taken[k] = True
+        bins[found], energy[found] = best, max(total, 0.0)
+        found += 1
+    return bins[:found], energy[:found]

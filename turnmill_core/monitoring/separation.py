@@ -49,17 +49,8 @@ def prepare(x: Array, rate: float, top: float) -> Prepared:
     top = min(top, 0.45 * rate)
     up, down = max(1, math.ceil(4 * top / rate)), max(1, int(rate / (4 * top)))
     taps = _low_pass(top / (rate * up), up)
-    samples = _resampled(x - x.mean(), taps, up, down)
-    return Prepared(samples, rate * up / down, top, ndimage.spline_filter1d(samples, 3, mode="mirror"))
-
-
-def _resampled(x: Array, taps: Array, up: int, down: int) -> Array:
-    """scipy.signal.resample_poly without its checks: x at up / down of its rate, zero beyond its ends."""
-    half = (len(taps) - 1) // 2
-    lead = (down - half % down) % down
-    full: Array = signal.upfirdn(np.concatenate([np.zeros(lead), taps * up]), x, up, down)
-    first, count = (half + lead) // down, -(-len(x) * up // down)
-    return full[first: first + count]
+    samples = _kernels.resampled(x - x.mean(), taps, up, down)
+    return Prepared(samples, rate * up / down, top, _kernels.spline_coefficients(samples))
 
 
 @lru_cache(maxsize=16)

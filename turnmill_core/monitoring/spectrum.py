@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
+
+from turnmill_core.monitoring import _kernels
 
 Array = NDArray[np.float64]
 
@@ -69,12 +73,8 @@ def spectrum(x: Array, rate: float, top: float) -> Spectrum:
 
 def noise_floor(power: Array, block: int) -> Array:
     """Mean noise power per bin: medians over blocks of bins, over ln 2, joined by straight lines."""
-    blocks = max(1, len(power) // block)
-    size = min(block, len(power))
-    medians = np.partition(power[: blocks * size].reshape(blocks, size), size // 2, axis=1)[:, size // 2]
-    centres = (np.arange(len(medians)) + 0.5) * block
-    floor: Array = np.interp(np.arange(len(power)), centres, medians) / np.log(2)
-    return np.maximum(floor, np.finfo(float).tiny)
+    floor: Array = _kernels.block_medians(power, block)
+    return np.maximum(floor / math.log(2), np.finfo(float).tiny)
 
 
 def lines(s: Spectrum, lowest: float, ratio: float, most: int) -> tuple[Line, ...]:
@@ -83,35 +83,19 @@ def lines(s: Spectrum, lowest: float, ratio: float, most: int) -> tuple[Line, ..
     Frequency by a parabola through the logarithm of three bins (bias below 0.02 bins for Hann);
     energy from the main lobe, less the floor in it.
     """
-    p = s.power
-    lobe = 2 * PAD
-    inner = p[1:-1]
-    at = 1 + np.flatnonzero((inner > p[:-2]) & (inner >= p[2:]) & (inner > ratio * s.floor[1:-1]))
-    at = at[at * s.step >= lowest]
-    at = at[np.argsort(-p[at], kind="stable")]
-    found: list[Line] = []
-    taken = np.zeros(len(p), dtype=bool)
-    for k in at:
-        if taken[k]:
-            continue
-        low, high = max(0, k - lobe), min(len(p), k + lobe + 1)
-        free = ~taken[low:high]
-        energy = float(np.sum((p[low:high] - s.floor[low:high])[free]))
-        taken[low:high] = True
-        found.append(Line(peak(s, int(k)), max(energy, 0.0), float(p[k] / s.floor[k])))
-        if len(found) == most:
-            break
-    return tuple(found)
+    bins, energy = _kernels.strongest_peaks(s.power, s.floor, math.ceil(lowest / s.step), ratio, most, 2 * PAD)
+    return tuple(Line(peak(s, k), e, float(s.power[k] / s.floor[k]))
+                 for k, e in zip(bins.tolist(), energy.tolist(), strict=True))
 
 
 def peak(s: Spectrum, k: int) -> float:
     """Frequency of the peak at bin `k` [Hz], by a parabola through the logarithm of three bins."""
     if not 0 < k < len(s.power) - 1:
         return k * s.step
-    a, b, c = np.log(np.maximum(s.power[k - 1: k + 2], np.finfo(float).tiny))
+    a, b, c = (math.log(max(p, sys.float_info.min)) for p in s.power[k - 1: k + 2].tolist())
     bend = a - 2 * b + c
     shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
-    return float((k + min(0.5, max(-0.5, shift))) * s.step)
+    return (k + min(0.5, max(-0.5, shift))) * s.step
 
 
 def near(values: Array, s: Spectrum, frequencies: Array, tolerance: float) -> Array:
