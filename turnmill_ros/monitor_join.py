@@ -217,7 +217,8 @@ class MonitorFeed:
         judged: list[tuple[Verdict, str]] = []
         while self._coming and (not self._given or self._given[-1].stamp_ns < until_ns):
             self._axes = self._coming.popleft()
-            self._given.append(SpindleSpeed(self._axes.stamp_ns, self._axes.velocity[SPINDLE]))
+            self._given.append(SpindleSpeed(self._axes.stamp_ns, self._axes.velocity[SPINDLE],
+                                            self._axes.position[SPINDLE]))
             judged += self._give(self._given[-1])
         while self._given and self._given[-1].stamp_ns - self._given[0].stamp_ns > KEPT_AXES_NS:
             self._given.popleft()

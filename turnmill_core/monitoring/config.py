@@ -19,7 +19,8 @@ class ChatterConfig:
 
     window [s] and revolutions: a window lasts max(window, revolutions at the speed of its end), at
     most longest_window [s]; hop [s] between windows.
-    device, channel: the judged device and channel; empty: the first seen, the first usable.
+    device, channel: the judged device and channel; empty: the first seen, the first usable. tip_x, tip_y: the
+    tool tip's motion, found from the fibre probes among the sensors.
     fallback: judge the next usable channel where the chosen one is dead or saturated.
 
     expect_axes: windows wait for spindle speeds that cover their end, at most speed_timeout [s] of
@@ -32,6 +33,7 @@ class ChatterConfig:
     enter_ratio, leave_ratio: asynchronous (or half-order) energy over total energy at which chatter
     begins and ends; an amplitude of 20 % of the synchronous one is an energy of 0.04.
     sensors: calibration of channels in volts.
+    runout_share: share of half-order lines in the cutting force's energy that a known runout gives (NaN: not known).
 
     enter_dwell, lone_dwell, leave_dwell, marginal_dwell, cut_dwell: windows in a row that must agree before chatter
     begins in a cut, before it begins where nothing but the chatter shows a cut, before it ends,
@@ -64,6 +66,7 @@ class ChatterConfig:
     marginal_dwell: int = 3
     cut_dwell: int = 2
     sensors: Sensors = NO_SENSORS
+    runout_share: float = math.nan
 
     def __post_init__(self) -> None:
         require(self.teeth >= 1, "teeth", self.teeth, "", "an integer >= 1")
@@ -83,6 +86,8 @@ class ChatterConfig:
         require(self.gate_ratio > 1, "gate ratio", self.gate_ratio, "", "a number > 1")
         require(self.noise_floor is None or self.noise_floor > 0, "noise floor", self.noise_floor, "channel unit",
                 "a number > 0")
+        require(math.isnan(self.runout_share) or 0 <= self.runout_share <= 1, "runout share", self.runout_share, "",
+                "NaN or a share from 0 to 1")
         for name in ("enter_dwell", "lone_dwell", "leave_dwell", "marginal_dwell", "cut_dwell"):
             require(getattr(self, name) >= 1, name.replace("_", " "), getattr(self, name), "windows", "an integer >= 1")
 
@@ -102,5 +107,5 @@ def config_from_operation(op: Operation) -> ChatterConfig:
     pitch = op.tool.pitch
     return ChatterConfig(
         teeth=op.tool.teeth, nominal_speed=op.conditions.tool_speed,
-        equal_pitch=max(pitch) - min(pitch) < 1e-6, sensors=op.sensors,
+        equal_pitch=max(pitch) - min(pitch) < 1e-6, sensors=op.sensors, channel=op.sensors.judged,
     )

@@ -17,15 +17,17 @@ MEMORY_NS = 10_000_000_000
 
 @dataclass(frozen=True)
 class SpindleSpeed:
-    """Speed of the tool spindle [rad/s] at an instant [ns], from an axis state or a tachometer."""
+    """Speed [rad/s] and angle [rad] (NaN: not known) of the tool spindle at an instant [ns], from an axis state or a
+    tachometer."""
 
     stamp_ns: int
     speed: float
+    angle: float = math.nan
 
 
 def remember(held: tuple[SpindleSpeed, ...], item: SpindleSpeed) -> tuple[SpindleSpeed, ...]:
     """Speeds in order of stamp with `item` (magnitude); left out: one not newer than the newest, or not finite."""
-    item = SpindleSpeed(item.stamp_ns, abs(item.speed))
+    item = SpindleSpeed(item.stamp_ns, abs(item.speed), item.angle)
     if not math.isfinite(item.speed) or (held and item.stamp_ns <= held[-1].stamp_ns):
         return held
     drop = 0

@@ -6,17 +6,15 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from turnmill_core.monitoring import stream as streams
-from turnmill_core.monitoring.blocks import Channel, Status
+from turnmill_core.monitoring.channel import choose
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
 from turnmill_core.monitoring.features import CALM, Features, features
 from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
-from turnmill_core.monitoring.sensors import implausible
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
@@ -32,6 +30,7 @@ from turnmill_core.monitoring.speed import (
     speed_at,
 )
 from turnmill_core.monitoring.stream import Stream
+from turnmill_core.monitoring.tip import ShankRunout, learned, probes_in, tip_in
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
 from turnmill_core.prediction import Prior
 
@@ -55,7 +54,8 @@ PULL = 0.3
 class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
     ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
-    ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far."""
+    ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far, runout: of
+    the shank, as fibre probes see it."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
@@ -64,6 +64,7 @@ class Tracker:
     history: tuple[Seen, ...] = ()
     middle: float = 1.0
     calm: int = 0
+    runout: ShankRunout = field(default_factory=ShankRunout)
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -85,8 +86,14 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
     reason, text = streams.trouble(s, start, end)
     if reason is not Reason.NONE:
         return _unknown(tracker, blank, reason, text)
-    channel, x, reason, text = _choose_channel(config, s, start, end)
-    blank = replace(blank, channel=s.channels[channel].name)
+    seen = probes_in(config, s, start, end, speeds, gap_ns)
+    if seen is None:
+        channel, x, reason, text = choose(config, s, start, end)
+        name = s.channels[channel].name
+    else:
+        name, reason, text = config.channel, seen.reason, seen.text
+        x = tip_in(config, seen, tracker.runout, s.sample_rate)
+    blank = replace(blank, channel=name)
     if reason is not Reason.NONE:
         return _unknown(tracker, blank, reason, text)
     level = math.sqrt(max(0.0, float(np.einsum("i,i", x, x)) / len(x) - float(x.mean()) ** 2))
@@ -103,7 +110,13 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
     if turned.spread > LARGEST_SPREAD:
         return _unknown(tracker, blank, Reason.SPEED_CHANGING,
                         f"the spindle speed differs by up to {100 * turned.spread:.0f} % from its mean")
-    return _judge_samples(config, tracker, replace(blank, spindle_speed_source=source), x, s.sample_rate, turned, prior)
+    tracker, verdict = _judge_samples(config, tracker, replace(blank, spindle_speed_source=source), x, s.sample_rate,
+                                      turned, prior)
+    if seen is not None and verdict.state is ChatterKind.AIR and verdict.reason is not Reason.PERSISTENCE:
+        runout = learned(tracker.runout, seen)
+        new = runout.known and not tracker.runout.known
+        tracker = replace(tracker, runout=runout, background=Background() if new else tracker.background)
+    return tracker, verdict
 
 
 def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tuple[Tracker, Verdict]:
@@ -154,7 +167,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     calm = tracker.calm
     if plain_comb(f) and abs(math.log(f.change)) < 0.3 and sum(x.energy for x in f.lines) < CALM * f.synchronous:
         middle, calm = f.speed_ratio, min(SURE, calm + 1)
-    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm), verdict
+    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm, tracker.runout), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
@@ -200,46 +213,3 @@ def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judg
         asynchronous_ratio=judgement.asynchronous_ratio, half_order_ratio=judgement.half_order_ratio,
         spindle_speed_confidence=f.comb / f.comb_of if f.comb_of else 0.0,
     )
-
-
-def _choose_channel(config: ChatterConfig, s: Stream, start: int, end: int) -> tuple[int, Array, Reason, str]:
-    """Index and samples of the judged channel, and why it cannot be judged (NONE where it can)."""
-    names = [c.name for c in s.channels]
-    if config.channel and config.channel not in names:
-        return 0, np.zeros(0), Reason.BAD_SAMPLES, f"no channel {config.channel!r} among {', '.join(names)}"
-    chosen = names.index(config.channel) if config.channel else 0
-    first: tuple[int, Array, Reason, str] | None = None
-    others = [k for k in range(len(names)) if k != chosen] if config.fallback or not config.channel else []
-    for k in (chosen, *others):
-        x = streams.samples(s, start, end, k)
-        reason, text = _condition(x, streams.status(s, start, end, k), s.channels[k])
-        if reason is Reason.NONE:
-            return k, x.astype(np.float64), reason, text
-        first = first or (k, x.astype(np.float64), reason, text)
-    assert first is not None
-    return first
-
-
-def _condition(x: NDArray[np.float32], status: Status, channel: Channel) -> tuple[Reason, str]:
-    name = channel.name
-    if not np.isfinite(x).all():
-        return Reason.BAD_SAMPLES, f"channel {name} holds values that are no numbers"
-    low, high = float(x.min()), float(x.max())
-    if status & Status.DEAD or low == high:
-        return Reason.BAD_SAMPLES, f"channel {name} is dead"
-    wrong = implausible(channel, low, high)
-    if wrong:
-        return Reason.BAD_SAMPLES, f"channel {name}: {wrong}"
-    if status & Status.SATURATED or _clipped(x, low, high):
-        return Reason.SATURATED, f"channel {name} is saturated"
-    return Reason.NONE, ""
-
-
-def _clipped(x: NDArray[np.float32], low: float, high: float) -> bool:
-    """True where the extremes are held: at least 0.2 % of the samples equal an extreme, mostly in runs."""
-    for extreme in (low, high):
-        at = np.flatnonzero(x == extreme)
-        held = len(at) >= max(8, 0.002 * len(x)) and np.mean(np.diff(at) == 1) > 0.4
-        if held and abs(extreme) >= 0.99 * max(-low, high):
-            return True
-    return False
