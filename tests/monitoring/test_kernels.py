@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy import ndimage, signal
@@ -76,6 +78,42 @@ def test_row_fits_are_least_squares() -> None:
     basis = np.stack([np.ones(9), r, r**2 - np.mean(r**2)], axis=1)
     assert np.array(found) == pytest.approx(np.linalg.lstsq(basis, table, rcond=None)[0], abs=1e-12)
     assert np.allclose(_kernels.row_fits.py_func(table), found, rtol=1e-12)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-6])
+def test_waves_are_sinusoids_and_their_ramps(jitter: float) -> None:
+    times = 0.3 + np.arange(700) * 8e-5 + jitter * RNG.uniform(0, 1, 700)
+    phase = 2 * math.pi * np.outer([871.3, 4000.0], times)
+    ramp = np.linspace(-1, 1, 700)
+    expected = np.concatenate([np.cos(phase), np.sin(phase), np.cos(phase) * ramp, np.sin(phase) * ramp])
+    for kernel in (_kernels.waves, _kernels.waves.py_func):
+        assert kernel(times, np.array([871.3, 4000.0])) == pytest.approx(expected, abs=1e-9)
+
+
+def test_normal_equations() -> None:
+    columns, values = RNG.standard_normal((3, 21)), RNG.standard_normal(21)
+    for kernel in (_kernels.normal_equations, _kernels.normal_equations.py_func):
+        gram, right = kernel(columns, values)
+        assert gram == pytest.approx(columns @ columns.T)
+        assert right == pytest.approx(columns @ values)
+    assert _kernels.dot.py_func(columns[0], values) == _kernels.dot(columns[0], values)
+
+
+def test_energy_of_a_harmonic_with_a_trend() -> None:
+    mean, trend = RNG.standard_normal((2, 4)) + 1j * RNG.standard_normal((2, 4))
+    at, w = (np.arange(6) - 2.5) * 2, np.sin(math.pi * (np.arange(6) + 0.5) / 6) ** 4
+    expected = (np.abs(mean) ** 2 + np.sum(w * at**2) / np.sum(w) * np.abs(trend) ** 2) / 2
+    expected[0] = 0.0
+    for kernel in (_kernels.harmonic_energy, _kernels.harmonic_energy.py_func):
+        assert kernel(mean, trend, 6, 2) == pytest.approx(expected)
+
+
+def test_between_neighbours_and_beyond_the_last() -> None:
+    values = RNG.standard_normal(20)
+    for spacing in (0.37, 1.0, 2.0):
+        expected = np.interp(spacing * np.arange(60), np.arange(20), values, right=0.0)
+        assert _kernels.between(values, spacing, 60) == pytest.approx(expected)
+        assert _kernels.between.py_func(values, spacing, 60) == pytest.approx(expected)
 
 
 def test_family_holds_its_lines_and_those_of_its_multiples() -> None:

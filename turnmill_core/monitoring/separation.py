@@ -124,17 +124,13 @@ class Synchronous:
     period: int
     rows: int
     wave: Array
-    mean: Array
-    trend: Array
+    mean: NDArray[np.complex128]
+    trend: NDArray[np.complex128]
     bend: Array
 
     def energy(self) -> Array:
         """Mean square of every harmonic with its trend, in the weights of a Spectrum (Hann squared)."""
-        at = (np.arange(self.rows) - (self.rows - 1) / 2) * self.period
-        w = np.sin(math.pi * (np.arange(self.rows) + 0.5) / self.rows) ** 4
-        spread = float(np.sum(w * at**2) / np.sum(w))
-        found: Array = (np.abs(self.mean) ** 2 + spread * np.abs(self.trend) ** 2) / 2
-        found[0] = 0.0
+        found: Array = _kernels.harmonic_energy(self.mean, self.trend, self.rows, self.period)
         return found
 
 
@@ -155,12 +151,10 @@ def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Ar
     """
     if not frequencies:
         return np.zeros_like(values)
-    wave = np.exp(2j * math.pi * np.outer(frequencies, layout.times))
-    ramp = np.linspace(-1.0, 1.0, len(values))
-    columns = np.concatenate([wave.real, wave.imag, wave.real * ramp, wave.imag * ramp])
-    gram = np.einsum("ik,jk->ij", columns, columns)
+    columns = _kernels.waves(layout.times, np.array(frequencies))
+    gram, right = _kernels.normal_equations(columns, values)
     gram[np.diag_indices(len(gram))] *= 1 + 1e-9
-    found: Array = np.einsum("i,ij->j", np.linalg.solve(gram, np.einsum("ik,k->i", columns, values)), columns)
+    found: Array = np.einsum("i,ij->j", np.linalg.solve(gram, right), columns)
     return found
 
 
@@ -223,7 +217,6 @@ def harmonic_noise(floor: Spectrum, count: int, frequency: float, period: int, d
 
     count: number of harmonics, multiples of frequency / period [Hz]; duration [s] of the window.
     """
-    at = np.arange(count) * frequency / period
-    density = np.interp(at, floor.frequency, floor.floor / floor.step, right=0.0)
-    noise: Array = 1.5 * density / duration
+    noise: Array = _kernels.between(floor.floor, frequency / (period * floor.step), count)
+    noise *= 1.5 / (floor.step * duration)
     return noise
