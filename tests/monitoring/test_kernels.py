@@ -73,11 +73,65 @@ def test_strongest_peaks_take_their_lobes() -> None:
 
 def test_row_fits_are_least_squares() -> None:
     table = RNG.standard_normal((9, 5))
-    found = _kernels.row_fits(table)
+    fits, wave = _kernels.row_fits(table)
     r = np.arange(9) - 4.0
     basis = np.stack([np.ones(9), r, r**2 - np.mean(r**2)], axis=1)
-    assert np.array(found) == pytest.approx(np.linalg.lstsq(basis, table, rcond=None)[0], abs=1e-12)
-    assert np.allclose(_kernels.row_fits.py_func(table), found, rtol=1e-12)
+    assert fits == pytest.approx(np.linalg.lstsq(basis, table, rcond=None)[0], abs=1e-12)
+    assert wave.reshape(9, 5) == pytest.approx(basis[:, :2] @ fits[:2], abs=1e-12)
+    for plain, compiled in zip(_kernels.row_fits.py_func(table), (fits, wave), strict=True):
+        assert np.allclose(plain, compiled, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 5, 8])
+def test_half_means_leave_the_middle_out(count: int) -> None:
+    table = RNG.standard_normal((count, 4))
+    expected = np.stack([table[: count // 2].mean(axis=0), table[-(count // 2):].mean(axis=0)])
+    assert _kernels.half_means(table) == pytest.approx(expected)
+    assert _kernels.half_means.py_func(table) == pytest.approx(expected)
+
+
+def test_harmonics_that_tell_the_speed() -> None:
+    def told(powers: dict[int, float], share: float = 0.05) -> list[int]:
+        mean = np.full(40, 1e-3, dtype=complex)
+        for h, power in powers.items():
+            mean[h] = math.sqrt(power) * np.exp(1j * h)
+        results = [kernel(mean, np.full(40, 1e-4), 20, 4, share).tolist()
+                   for kernel in (_kernels.telling_harmonics, _kernels.telling_harmonics.py_func)]
+        assert results[0] == results[1]
+        return results[0]
+
+    tooth, every = [4, 8, 12, 16], list(range(1, 20))
+    assert told({4: 1.0, 1: 5.0, 2: 5.0, 3: 5.0}) == tooth
+    assert told({1: 5.0, 2: 5.0, 3: 5.0, 5: 5.0}) == every
+    assert told({1: 5.0, 2: 5.0, 3: 5.0, 25: 5.0}) == tooth
+    assert told({1: 50.0, 2: 5.0, 3: 5.0, 5: 5.0}) == tooth
+
+
+def test_weighted_median_and_drift_of_phases() -> None:
+    for kernel in (_kernels.weighted_median, _kernels.weighted_median.py_func):
+        assert kernel(np.array([3.0, 1.0, 2.0]), np.array([1.0, 1.0, 1.5])) == 2.0
+        assert kernel(np.array([3.0, 1.0, 2.0]), np.array([9.0, 1.0, 1.5])) == 3.0
+    mean = 2.0 * np.exp(1j * np.arange(12.0))
+    order = np.arange(12)
+    trend, bend = (2j * math.pi * order * turned * mean for turned in (1e-3, 2e-5))
+    mean[8] = 1e-9
+    harmonics = np.array([4, 8])
+    for kernel in (_kernels.phase_drift, _kernels.phase_drift.py_func):
+        assert kernel(mean, trend, bend, harmonics, np.full(2, 1e-6)) == pytest.approx((1e-3, 2e-5))
+        assert kernel(mean, trend, bend, harmonics, np.full(2, 1e6)) == (0.0, 0.0)
+
+
+def test_tapered_has_no_mean_and_is_followed_by_zeros() -> None:
+    x, window = 5 + RNG.standard_normal(30), np.hanning(30)
+    expected = np.append((x - x.mean()) * window, np.zeros(10))
+    for kernel in (_kernels.tapered, _kernels.tapered.py_func):
+        assert kernel(x, window, 40) == pytest.approx(expected, abs=1e-12)
+
+
+def test_largest_near_a_place() -> None:
+    values = np.arange(10.0) % 4
+    for kernel in (_kernels.largest_near, _kernels.largest_near.py_func):
+        assert kernel(values, np.array([4.6, 2.4, 9.0, -3.0, 8.4]), 1).tolist() == [2.0, 3.0, 0.0, 0.0, 3.0]
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-6])

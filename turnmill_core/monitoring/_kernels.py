@@ -116,13 +116,15 @@ def spline_at(coefficients: Floats, turns: Floats, start: float, step: float, co
 
 
 @njit(cache=True)
-def row_fits(table: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean, slope and bend over the rows of table (n, m): least squares on 1, r and r^2 - mean(r^2).
+def row_fits(table: Floats) -> tuple[Floats, Floats]:
+    """Mean, slope and bend over the rows of table (n, m): least squares on 1, r and r^2 - mean(r^2), (3, m); and what
+    mean and slope give for all rows (n m,).
 
     r: number of the row, from the middle one.
     """
     count, width = table.shape
-    mean, trend, bend = np.zeros(width), np.zeros(width), np.zeros(width)
+    fits, wave = np.zeros((3, width)), np.empty((count, width))
+    mean, slope, bend = fits
     mean_square = (count * count - 1) / 12.0
     squares = fourths = 0.0
     for i in range(count):
@@ -132,13 +134,93 @@ def row_fits(table: Floats) -> tuple[Floats, Floats, Floats]:
         fourths += b * b
         for k in range(width):
             mean[k] += table[i, k]
-            trend[k] += r * table[i, k]
+            slope[k] += r * table[i, k]
             bend[k] += b * table[i, k]
     for k in range(width):
         mean[k] /= count
-        trend[k] /= squares
+        slope[k] /= squares
         bend[k] /= fourths
-    return mean, trend, bend
+    for i in range(count):
+        r = i - (count - 1) / 2.0
+        for k in range(width):
+            wave[i, k] = mean[k] + r * slope[k]
+    return fits, wave.ravel()
+
+
+@njit(cache=True)
+def half_means(table: Floats) -> Floats:
+    """Means over the first and the last half of the rows of table (n, m), n > 1: (2, m)."""
+    count, width = table.shape
+    half = count // 2
+    found = np.zeros((2, width))
+    for i in range(half):
+        for k in range(width):
+            found[0, k] += table[i, k] / half
+            found[1, k] += table[count - half + i, k] / half
+    return found
+
+
+@njit(cache=True)
+def telling_harmonics(mean: Complexes, noise: Floats, last: int, teeth: int, share: float) -> NDArray[np.int64]:
+    """Harmonics, multiples of the spindle frequency below `last`, that tell the speed: those of the tooth passing
+    frequency, or all where the former hold less than `share` of the energy above the noise, and four or more do,
+    none of which holds 60 %.
+
+    mean (m,): amplitudes; noise (m,): mean square that noise alone gives each.
+    """
+    total = tooth = largest = 0.0
+    count = 0
+    for h in range(1, last):
+        power = mean[h].real ** 2 + mean[h].imag ** 2
+        if power >= 20.0 * noise[h]:
+            total += power
+            largest = max(largest, power)
+            tooth += power if h % teeth == 0 else 0.0
+            count += 1 if power > 0.0 else 0
+    every = count >= 4 and largest < 0.6 * total and tooth < share * total
+    return np.arange(1, last) if every else np.arange(teeth, last, teeth)
+
+
+@njit(cache=True)
+def weighted_median(values: Floats, weight: Floats) -> float:
+    """The first of the values (n,), ascending, at which half of the weight (n,) is reached."""
+    order = np.argsort(values, kind="mergesort")
+    passed, half = 0.0, 0.5 * np.sum(weight)
+    for k in order:
+        passed += weight[k]
+        if passed >= half:
+            return float(values[k])
+    return float(values[order[-1]])
+
+
+@njit(cache=True)
+def phase_drift(mean: Complexes, trend: Complexes, bend: Complexes, harmonics: NDArray[np.int64],
+                noise: Floats) -> tuple[float, float]:
+    """Turns per revolution, and per revolution squared, by which the phases of harmonics go away from the assumed ones.
+
+    mean, trend, bend (m,): amplitudes, their change per revolution and its change; noise (h,): mean square that
+    noise gives each of the harmonics (h,). Weighted medians over those 20 times above it; (0, 0) without any.
+    """
+    used = np.empty(len(harmonics), dtype=np.int64)
+    power = np.empty(len(harmonics))
+    n = 0
+    for k in range(len(harmonics)):
+        h = harmonics[k]
+        power[n] = mean[h].real ** 2 + mean[h].imag ** 2
+        if power[n] > 20.0 * noise[k]:
+            used[n] = h
+            n += 1
+    if n == 0:
+        return 0.0, 0.0
+    middle = np.median(power[:n])
+    speed, ramp, weight = np.empty(n), np.empty(n), np.empty(n)
+    for k in range(n):
+        h = used[k]
+        scale = 2.0 * np.pi * h * power[k]
+        weight[k] = h * min(1.0, math.sqrt(power[k] / middle))
+        speed[k] = (mean[h].real * trend[h].imag - mean[h].imag * trend[h].real) / scale
+        ramp[k] = (mean[h].real * bend[h].imag - mean[h].imag * bend[h].real) / scale
+    return weighted_median(speed, weight), weighted_median(ramp, weight)
 
 
 @njit(cache=True)
@@ -298,6 +380,29 @@ def block_medians(power: Floats, block: int) -> Floats:
         if count > 1:
             floor[k] += (place - i) * (medians[i + 1] - medians[i])
     return floor
+
+
+@njit(cache=True)
+def tapered(x: Floats, window: Floats, count: int) -> Floats:
+    """x (n,) less its mean, times a window (n,), followed by zeros: (count,)."""
+    total = 0.0
+    for k in range(len(x)):
+        total += x[k]
+    found = np.zeros(count)
+    for k in range(len(x)):
+        found[k] = (x[k] - total / len(x)) * window[k]
+    return found
+
+
+@njit(cache=True)
+def largest_near(values: Floats, places: Floats, reach: int) -> Floats:
+    """Largest of values (n,) within `reach` of each place (m,), rounded to the next; 0 where that is not inside."""
+    found = np.zeros(len(places))
+    for i in range(len(places)):
+        at = int(np.rint(places[i]))
+        if reach <= at < len(values) - reach:
+            found[i] = values[at - reach: at + reach + 1].max()
+    return found
 
 
 @njit(cache=True)

@@ -221,13 +221,8 @@ def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
 
 def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
     noise = harmonic_noise(parts.residual, len(parts.one.mean), parts.layout.frequency, 1, parts.layout.duration)
-    harmonics = np.arange(1, min(len(parts.one.mean), int(p.top / parts.layout.frequency)))
-    power = np.abs(parts.one.mean[harmonics]) ** 2
-    power[power < 20 * noise[harmonics]] = 0.0
-    tooth = harmonics % teeth == 0
-    several = np.count_nonzero(power) >= 4 and power.max() < 0.6 * power.sum()
-    if power[tooth].sum() >= COMB_SHARE * power.sum() or not several:
-        harmonics = harmonics[tooth]
+    last = min(len(parts.one.mean), int(p.top / parts.layout.frequency))
+    harmonics = _kernels.telling_harmonics(parts.one.mean, noise, last, teeth, COMB_SHARE)
     return drift(parts.layout, parts.one, harmonics, noise[harmonics])
 
 
@@ -250,10 +245,9 @@ def _half(frequencies: Array, energy: Array) -> HalfOrder:
 def _change(parts: _Parts, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
     """Amplitude of the harmonics in the second half of the window over the first; no less than the noise's."""
     table = parts.values.reshape(parts.layout.revolutions, parts.layout.points)
-    half = len(table) // 2
     least = 2 * float(noise[harmonics].sum())
-    early, late = (float(np.sum(np.abs(fft.rfft(part.mean(axis=0))[harmonics]) ** 2)) * 2 / parts.layout.points**2
-                   for part in (table[:half], table[-half:]))
+    amplitude = fft.rfft(_kernels.half_means(table))[:, harmonics] * (2 / parts.layout.points)
+    early, late = ((amplitude.real**2 + amplitude.imag**2).sum(axis=1) / 2).tolist()
     return math.sqrt(max(late, least) / max(early, least)) if least > 0 else 1.0
 
 
@@ -277,11 +271,14 @@ def _turning(parts: _Parts, clear: Array, noise: Array, tooth: NDArray[np.bool_]
     the tooth passing frequency, and phases that noise could turn as far, are left alone.
     """
     mean, trend = parts.one.mean, parts.one.trend
+    moved = (clear > 10 * noise) & ~tooth
+    if not moved.any():
+        return (), moved
     noise = np.maximum(noise, np.finfo(float).tiny)
     power = np.maximum(np.abs(mean) ** 2, np.finfo(float).tiny)
     rate = np.imag(np.conj(mean) * trend) / (2 * math.pi * power)
     spread = np.sqrt(noise / power) / parts.layout.revolutions
-    moved = (clear > 10 * noise) & ~tooth & (np.abs(rate) > TURNING + 3 * spread)
+    moved &= np.abs(rate) > TURNING + 3 * spread
     found = [Line(float((h + rate[h]) * parts.layout.frequency), float(clear[h]), float(clear[h] / noise[h]))
              for h in np.flatnonzero(moved)]
     return tuple(x for x in found if x.frequency >= lowest), moved

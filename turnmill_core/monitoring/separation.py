@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,8 +116,8 @@ class Synchronous:
 
     wave: its values in the order of the layout; mean, trend: complex amplitudes at multiples 0, 1,
     2 ... of the spindle frequency over `period`, and their change per revolution; the peak
-    amplitude of a harmonic is |mean|; rows: number of periods averaged; bend: per angle, what the values
-    change with the square of the period's number.
+    amplitude of a harmonic is |mean|; rows: number of periods averaged; bend: what they change with the square of the
+    revolution's number.
     """
 
     period: int
@@ -126,7 +125,7 @@ class Synchronous:
     wave: Array
     mean: NDArray[np.complex128]
     trend: NDArray[np.complex128]
-    bend: Array
+    bend: NDArray[np.complex128]
 
     def energy(self) -> Array:
         """Mean square of every harmonic with its trend, in the weights of a Spectrum (Hann squared)."""
@@ -137,11 +136,9 @@ class Synchronous:
 def synchronous(layout: Layout, values: Array, period: int) -> Synchronous:
     """Synchronous part of `values` (laid out like `layout`) over `period` revolutions, with linear trend."""
     table = values.reshape(layout.revolutions // period, period * layout.points)
-    rows = np.arange(len(table)) - (len(table) - 1) / 2
-    mean, trend, bend = _kernels.row_fits(table)
-    scale = 2 / (period * layout.points)
-    return Synchronous(period, len(table), (mean + rows[:, None] * trend).ravel(),
-                       fft.rfft(mean) * scale, fft.rfft(trend) * (scale / period), bend)
+    fits, wave = _kernels.row_fits(table)
+    mean, trend, bend = fft.rfft(fits) * (2 / (period * layout.points))
+    return Synchronous(period, len(table), wave, mean, trend / period, bend / period**2)
 
 
 def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Array:
@@ -170,7 +167,7 @@ class Drift:
     ramp: float = 0.0
 
 
-def drift(layout: Layout, one: Synchronous, harmonics: NDArray[np.integer[Any]], noise: Array) -> Drift:
+def drift(layout: Layout, one: Synchronous, harmonics: NDArray[np.int64], noise: Array) -> Drift:
     """Drift seen in the phases of the harmonics (multiples of the spindle frequency) of a synchronous part.
 
     one: over single revolutions of `layout`. A wrong speed turns the phase of harmonic h by 2 pi h error each
@@ -178,23 +175,7 @@ def drift(layout: Layout, one: Synchronous, harmonics: NDArray[np.integer[Any]],
     bend), then weighted medians over the harmonics above the noise, so that a line near one harmonic
     moves it little; noise: mean square that noise alone gives each. Zero without any such harmonic.
     """
-    power = np.abs(one.mean[harmonics]) ** 2
-    use = power > 20 * noise
-    if not use.any():
-        return Drift()
-    order, power = harmonics[use], power[use]
-    bend = fft.rfft(one.bend) * (2 / layout.points)
-    conjugate = np.conj(one.mean[order])
-    weight = order * np.minimum(1.0, np.sqrt(power / np.median(power)))
-    scale = 2 * math.pi * order * power
-    return Drift(_weighted_median(np.imag(conjugate * one.trend[order]) / scale, weight),
-                 _weighted_median(np.imag(conjugate * bend[order]) / scale, weight))
-
-
-def _weighted_median(values: Array, weight: Array) -> float:
-    ascending = np.argsort(values, kind="stable")
-    passed = np.cumsum(weight[ascending])
-    return float(values[ascending][np.searchsorted(passed, passed[-1] / 2)])
+    return Drift(*_kernels.phase_drift(one.mean, one.trend, one.bend, harmonics, noise))
 
 
 def followed(turns: Array, revolutions: int, found: Drift) -> Array:

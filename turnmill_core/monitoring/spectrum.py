@@ -66,7 +66,7 @@ def spectrum(x: Array, rate: float, top: float) -> Spectrum:
     count = fft.next_fast_len(PAD * len(x), real=True)
     step = rate / count
     keep = min(count // 2, int(top / step)) + 1
-    amplitude = fft.rfft((x - x.mean()) * w, count)[:keep]
+    amplitude = fft.rfft(_kernels.tapered(x, w, count))[:keep]
     power = (amplitude.real**2 + amplitude.imag**2) * (2 / (count * squares))
     return Spectrum(rate / count, power, noise_floor(power, max(8, round(40 * count / len(x)))))
 
@@ -74,7 +74,7 @@ def spectrum(x: Array, rate: float, top: float) -> Spectrum:
 def noise_floor(power: Array, block: int) -> Array:
     """Mean noise power per bin: medians over blocks of bins, over ln 2, joined by straight lines."""
     floor: Array = _kernels.block_medians(power, block)
-    return np.maximum(floor / math.log(2), np.finfo(float).tiny)
+    return np.maximum(floor / math.log(2), sys.float_info.min)
 
 
 def lines(s: Spectrum, lowest: float, ratio: float, most: int) -> tuple[Line, ...]:
@@ -100,9 +100,5 @@ def peak(s: Spectrum, k: int) -> float:
 
 def near(values: Array, s: Spectrum, frequencies: Array, tolerance: float) -> Array:
     """Largest of `values` (one per bin) within `tolerance` [Hz] of each frequency; 0 outside the spectrum."""
-    reach = max(0, round(tolerance / s.step))
-    at = np.rint(np.asarray(frequencies) / s.step).astype(int)
-    inside = (at >= reach) & (at < len(values) - reach)
-    index = np.where(inside, at, reach)[..., None] + np.arange(-reach, reach + 1)
-    found: Array = np.where(inside, values[np.minimum(index, len(values) - 1)].max(axis=-1), 0.0)
+    found: Array = _kernels.largest_near(values, frequencies / s.step, max(0, round(tolerance / s.step)))
     return found
