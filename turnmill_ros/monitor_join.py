@@ -30,7 +30,7 @@ from turnmill_core.operation import Operation, require
 from turnmill_core.prediction import Prior
 from turnmill_ros.block_counts import BlockCounts
 from turnmill_ros.operation_track import OperationTrack
-from turnmill_ros.predicted import Predictor
+from turnmill_ros.predicted import Predictor, explained_by_runout
 
 LONGEST_WAIT_NS = 90_000_000_000
 """Time over which blocks are held at most; beyond it the oldest is judged with what is known.
@@ -70,8 +70,9 @@ class FeedSettings:
 
     def config(self, operation: Operation) -> ChatterConfig:
         """The monitor's settings for an operation."""
-        return replace(config_from_operation(operation), recorded_priors=self.prior in ("recorded", "computed"),
-                       expect_axes=self.axes != "none", **self.changes)  # type: ignore[arg-type]
+        return replace(config_from_operation(operation), runout_share=explained_by_runout(operation),
+                       recorded_priors=self.prior in ("recorded", "computed"), expect_axes=self.axes != "none",
+                       **self.changes)  # type: ignore[arg-type]
 
 
 class MonitorFeed:

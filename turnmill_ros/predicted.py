@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from turnmill_core.cutting.runout import half_order_share
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes
 from turnmill_core.operation import Conditions, Operation
@@ -66,3 +68,11 @@ class Predictor:
         point = self._known[1]
         return Prior(axes.stamp_ns, point.predicted_type, point.spectral_radius, point.chatter_frequency,
                      flip_multiplier(complex(m) for m in point.multipliers))
+
+
+def explained_by_runout(operation: Operation) -> float:
+    """Share of half-order lines that the operation's runout gives the force of its nominal cut; NaN: not known."""
+    try:
+        return half_order_share(operation, operation.conditions)
+    except ValueError:
+        return math.nan

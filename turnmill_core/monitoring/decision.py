@@ -8,17 +8,15 @@ from dataclasses import dataclass
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
 from turnmill_core.monitoring.gate import Background, plain_comb
+from turnmill_core.monitoring.half_order import half_order
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
-from turnmill_core.prediction import PredictedType, Prior
+from turnmill_core.prediction import Prior
 
 TRANSIENT = math.log(2.0)
 """A change of the synchronous amplitude between the halves of a window, up or down, that shows entry or exit."""
 
 WARNING = 0.5
 """A family that will pass the enter threshold in less than this [s] makes the cut marginal."""
-
-NEAR_FLIP = 0.92
-"""Predicted magnitude of a multiplier near -1 from which half-order lines are flip: models are no better than that."""
 
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
@@ -85,7 +83,7 @@ def _cut(config: ChatterConfig, f: Features, background: Background, ratio: floa
             return (ChatterKind.MARGINAL, Reason.ASYNCHRONOUS,
                     f"lines at {c.frequency:.1f} Hz hold {100 * share:.1f} % of the energy")
     if half > threshold and _dominates(config, f):
-        return _half_order(config, half, prior)
+        return half_order(config, half, prior)
     return ChatterKind.STABLE, Reason.SYNCHRONOUS, f"{100 * (1 - ratio):.1f} % of the energy is synchronous"
 
 
@@ -98,17 +96,6 @@ def _dominates(config: ChatterConfig, f: Features) -> bool:
     if config.odd:
         return f.half.energy > sum(x.energy for x in f.lines)
     return f.half.energy > f.synchronous - f.tooth - f.half.energy
-
-
-def _half_order(config: ChatterConfig, half: float, prior: Prior | None) -> tuple[ChatterKind, Reason, str]:
-    text = f"lines at odd multiples of half the tooth passing frequency, {100 * half:.0f} % of the synchronous energy"
-    if config.odd:
-        return ChatterKind.FLIP, Reason.HALF_ORDER, text
-    if prior is None or prior.predicted_type in (PredictedType.UNKNOWN, PredictedType.NO_CUT):
-        return ChatterKind.FLIP_OR_RUNOUT, Reason.NO_PRIOR, text + "; flip or runout: no prediction"
-    if prior.predicted_type is PredictedType.FLIP or prior.flip_multiplier > NEAR_FLIP:
-        return ChatterKind.FLIP, Reason.PRIOR_FLIP, text + "; predicted: flip, or close to it"
-    return ChatterKind.STABLE, Reason.PRIOR_RUNOUT, text + "; not predicted to flip: runout"
 
 
 @dataclass(frozen=True)

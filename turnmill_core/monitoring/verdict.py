@@ -41,6 +41,9 @@ class Reason(IntEnum):
     PRIOR_RUNOUT = 14
     NO_PRIOR = 15
     PERSISTENCE = 16
+    KNOWN_RUNOUT = 17
+    ABOVE_RUNOUT = 18
+    CONTRADICTION = 19
 
 
 class SpeedSource(IntEnum):
