@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 
 from tests.monitoring.signals import RATE, comb, hopf, judged, noise, phase
-from turnmill_core.monitoring.growth import WINDOWS, Seen, rate, remember, time_to
+from turnmill_core.monitoring.growth import WINDOWS, Seen, rate, remember, rise, time_to
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
+
+
+TOOTH = 220.0
 
 
 def exponential(growth: float, first: float = 1e-3, windows: int = WINDOWS) -> tuple[Seen, ...]:
     """History of a family whose amplitude grows as exp(growth t)."""
     history: tuple[Seen, ...] = ()
     for k in range(windows):
-        history = remember(history, Seen(0.05 * k, 900.0, first * math.exp(2 * growth * 0.05 * k)), 5.0)
+        history = remember(history, Seen(0.05 * k, 900.0, first * math.exp(2 * growth * 0.05 * k)), 5.0,
+                           TOOTH)
     return history
 
 
@@ -41,7 +45,20 @@ def test_no_rate_without_steady_growth() -> None:
 
 
 def test_another_frequency_begins_anew() -> None:
-    assert len(remember(exponential(4.0), Seen(0.3, 700.0, 1.0), 5.0)) == 1
+    assert len(remember(exponential(4.0), Seen(0.3, 700.0, 1.0), 5.0, TOOTH)) == 1
+
+
+@pytest.mark.parametrize("frequency", [900.0 + TOOTH, 900.0 - TOOTH, 2 * TOOTH - 900.0])
+def test_another_member_of_the_family_goes_on(frequency: float) -> None:
+    assert len(remember(exponential(4.0), Seen(0.3, abs(frequency), 1.0), 5.0, TOOTH)) == WINDOWS
+
+
+def test_energy_at_the_end_of_a_window_while_it_grows() -> None:
+    assert rise(exponential(4.0), 0.2) == pytest.approx(math.exp(4.0 * 0.2))
+    assert rise(exponential(4.0, windows=3), 0.2) == 1.0
+    assert rise(exponential(20.0, windows=3), 0.1) == pytest.approx(math.exp(2.0))
+    assert rise(exponential(1.0), 0.2) == 1.0
+    assert rise((), 0.2) == 1.0
 
 
 def test_growing_chatter_is_warned_of_before_it_is_chatter() -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from turnmill_core.monitoring.background import Background
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
-from turnmill_core.monitoring.gate import Background, plain_comb
+from turnmill_core.monitoring.gate import plain_comb
 from turnmill_core.monitoring.half_order import half_order
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 from turnmill_core.prediction import Prior
@@ -43,8 +44,7 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
     entering: out of the cut before, and the signal at least doubles within the window.
     """
-    own = [x for x in f.lines if x.energy > 4 * background.line_energy(x.frequency)]
-    asynchronous = sum(x.energy for x in own)
+    asynchronous = sum(x.energy for x in f.lines)
     total = asynchronous + f.synchronous + f.own_half
     ratio = asynchronous / total if total > 0 else 0.0
     before = 2 * sum(background.line_energy(x) for x in f.half.members)
@@ -52,7 +52,7 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     if not cut:
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
                          ratio, half)
-    kind, reason, text = _cut(config, f, background, ratio, half, chattering, prior, risen)
+    kind, reason, text = _cut(config, f, ratio, half, chattering, prior, risen)
     if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
         kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
         text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
@@ -64,11 +64,11 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     return Judgement(kind, reason, text, ratio, half)
 
 
-def _cut(config: ChatterConfig, f: Features, background: Background, ratio: float, half: float,
-         chattering: bool, prior: Prior | None, risen: float) -> tuple[ChatterKind, Reason, str]:
+def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, chattering: bool, prior: Prior | None,
+         risen: float) -> tuple[ChatterKind, Reason, str]:
     threshold = config.leave_ratio if chattering else config.enter_ratio
     c = f.chatter
-    if c is not None and f.lines[0].energy > 4 * background.line_energy(f.lines[0].frequency):
+    if c is not None:
         share = c.energy / (c.energy + f.synchronous + f.own_half)
         evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
         now = risen * c.energy / (risen * c.energy + f.synchronous + f.own_half)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring.background import NO_BACKGROUND, Background
 from turnmill_core.monitoring.separation import (
     LAYOUT,
     Drift,
@@ -124,12 +125,14 @@ class _Parts:
 
 
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
-             band: tuple[float, float], wide: tuple[float, float] | None = None) -> Features:
+             band: tuple[float, float], wide: tuple[float, float] | None = None,
+             background: Background = NO_BACKGROUND) -> Features:
     """Features of a window.
 
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
     [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; wide: further
-    band in which another speed is taken where it leaves a quarter of the asynchronous energy or less.
+    band in which another speed is taken where it leaves a quarter of the asynchronous energy or less; background:
+    whose tones are no lines of the cut.
     """
     parts, ratio = _followed(p, turns, steady, teeth, lowest, ratio, band)
     if wide is not None and parts.residual.power.sum() > CALM * parts.one.energy().sum():
@@ -148,7 +151,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     clear = np.where(moved, 0.0, clear)
     first = np.flatnonzero(tooth & inside)[:12]
     asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear))
-    asynchronous = _merged((*asynchronous, *turning), found.resolution)
+    asynchronous = tuple(x for x in _merged((*asynchronous, *turning), found.resolution) if not background.holds(x))
     if teeth % 2:
         half = _half_odd(parts, p.top, teeth)
         asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))

@@ -3,33 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-import numpy as np
-
+from turnmill_core.monitoring.background import Background
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
-from turnmill_core.monitoring.spectrum import Array, Spectrum
-
-STEP_HZ = 10.0
-
-
-@dataclass(frozen=True)
-class Background:
-    """Noise out of the cut, learned in windows judged as air.
-
-    energy: mean square in the band (NaN before the first such window); power: mean square per 10 Hz.
-    """
-
-    energy: float = math.nan
-    power: Array | None = None
-
-    def line_energy(self, frequency: float) -> float:
-        """Mean square that the background holds around a frequency [Hz]."""
-        if self.power is None:
-            return 0.0
-        k = int(frequency / STEP_HZ)
-        return float(self.power[max(0, k - 1): k + 2].sum())
+from turnmill_core.monitoring.spectrum import Spectrum
 
 
 def learn(config: ChatterConfig, background: Background, f: Features, whole: Spectrum) -> Background:
@@ -41,13 +19,8 @@ def learn(config: ChatterConfig, background: Background, f: Features, whole: Spe
     """
     if f.chatter is not None and f.chatter.sidebands and f.chatter.energy > 0.1 * f.energy:
         return background
-    index = (np.arange(len(whole.power)) * (whole.step / STEP_HZ)).astype(int)
-    binned = np.bincount(index, weights=whole.power).astype(np.float64)
-    if background.power is None or len(background.power) != len(binned):
-        return Background(f.energy, binned)
-    share = 0.05 if f.energy < config.gate_ratio**2 * background.energy else 0.002
-    return Background((1 - share) * background.energy + share * f.energy,
-                      (1 - share) * background.power + share * binned)
+    quiet = f.energy < config.gate_ratio**2 * background.energy
+    return background.towards(f.energy, whole, 0.05 if quiet else 0.002)
 
 
 def plain_comb(f: Features) -> bool:

@@ -12,11 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turnmill_core.monitoring import _kernels
+
 WINDOWS = 6
 """Windows over which a growth is looked at."""
 
 RISE_WINDOWS = 4
 """Newest windows over which the growth is taken that tells the amplitude at the end of a window."""
+
+STEEP_WINDOWS = 3
+STEEP = 4.0
+"""As many windows are enough where the energy grows by this factor over them."""
 
 LARGEST_RISE = 10.0
 
@@ -33,9 +39,12 @@ class Seen:
     share: float
 
 
-def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float) -> tuple[Seen, ...]:
-    """History with `seen`; begins anew where the frequency [Hz] moved by more than `tolerance` [Hz]."""
-    if history and abs(history[-1].frequency - seen.frequency) > tolerance:
+def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float, tooth_frequency: float) -> tuple[Seen, ...]:
+    """History with `seen`; begins anew where the family moved by more than `tolerance` [Hz].
+
+    The strongest member of a family may change: families are compared as |H + i f_tooth|.
+    """
+    if history and _kernels.distance(seen.frequency, history[-1].frequency, tooth_frequency) > tolerance:
         return (seen,)
     return (*history[-WINDOWS + 1:], seen)
 
@@ -59,6 +68,9 @@ def rise(history: tuple[Seen, ...], seconds: float) -> float:
     seconds [s]: length of the window. Half of it lies between its middle, which the mean is about, and its end.
     """
     found = rate(history[-RISE_WINDOWS:], RISE_WINDOWS)
+    if math.isnan(found):
+        newest = history[-STEEP_WINDOWS:]
+        found = rate(newest, STEEP_WINDOWS) if newest and newest[-1].share > STEEP * newest[0].share else math.nan
     return min(LARGEST_RISE, math.exp(found * seconds)) if found >= SLOWEST else 1.0
 
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnmill_core.monitoring import stream as streams
+from turnmill_core.monitoring.background import Background
 from turnmill_core.monitoring.channel import choose
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
 from turnmill_core.monitoring.features import CALM, Features, features
-from turnmill_core.monitoring.gate import Background, in_cut, learn, plain_comb
+from turnmill_core.monitoring.gate import in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
@@ -148,7 +149,8 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     wide = (middle - told, middle + told) if look and told > config.axis_band else None
     band = (middle - config.axis_band, middle + config.axis_band)
     ratio = min(band[1], max(band[0], ratio))
-    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide)
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide,
+                 tracker.background)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
@@ -190,10 +192,12 @@ def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
             end_ns: int) -> tuple[tuple[Seen, ...], float]:
     """Families of the last windows, and the time [s] in which a steadily growing one passes the enter threshold."""
     c = f.chatter
-    if c is None or c.sidebands == 0 or c.explained < 0.5:
+    if c is None or not (c.sidebands or plain_comb(f)) or c.explained < 0.5:
         return (), math.inf
     share = c.energy / (c.energy + f.synchronous + f.own_half)
-    history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), 0.02 * c.frequency)
+    tooth_frequency = f.frequency * config.principal_teeth
+    tolerance = min(0.02 * c.frequency, 0.1 * tooth_frequency)
+    history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), tolerance, tooth_frequency)
     return history, time_to(history, config.enter_ratio)
 
 
