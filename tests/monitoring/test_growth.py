@@ -11,7 +11,6 @@ from tests.monitoring.signals import RATE, comb, hopf, judged, noise, phase
 from turnmill_core.monitoring.growth import WINDOWS, Seen, rate, remember, rise, time_to
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 
-
 TOOTH = 220.0
 
 
