@@ -27,11 +27,13 @@ from bokeh.models import Div, Range1d
 from bokeh.server.server import Server
 
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
+from turnmill_core.monitoring.sensors import calibrate
 from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+from turnmill_core.operation_sensors import NO_SENSORS, Sensors
 from turnmill_ros import figures
 from turnmill_ros.analysis import merge
 from turnmill_ros.predictions import Predictions
-from turnmill_ros.signals import Stretch
+from turnmill_ros.signals import Stretch, recorded_channel
 
 SHOWN_S = 30.0
 """Length of what is shown over time."""
@@ -46,7 +48,7 @@ RPM = 60 / (2 * math.pi)
 class LiveData:
     """The newest SHOWN_S of a running graph; filled by one thread and drawn by another.
 
-    enter, leave [1]: thresholds of the asynchronous ratio that are drawn.
+    enter, leave [1]: thresholds of the asynchronous ratio that are drawn; sensors: that calibrate blocks in volts.
     """
 
     operation: str = ""
@@ -57,6 +59,7 @@ class LiveData:
     loads: deque[tuple[int, float, float]] = field(default_factory=deque)
     blocks: deque[SensorBlock] = field(default_factory=deque)
     suggestion: tuple[str, ...] = ()
+    sensors: Sensors = NO_SENSORS
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def verdict(self, found: Verdict) -> None:
@@ -75,6 +78,7 @@ class LiveData:
 
     def block(self, found: SensorBlock) -> None:
         """Add a sensor block; what is older than the spectrum needs, or of another stream, goes."""
+        found = calibrate(self.sensors, found)
         with self.lock:
             last = self.blocks[-1] if self.blocks else None
             if last is not None and (last.stream_id, last.end_sample) != (found.stream_id, found.first_sample):
@@ -107,7 +111,7 @@ def live_figures(data: LiveData) -> tuple[str, list[Any]]:
     if math.isfinite(data.enter):
         shown.append(figures.ratios(verdicts, now, data.enter, data.leave, x_range))
     shown += Predictions(loads, margins).plots(now, x_range)
-    if verdicts and (part := _stretch(blocks, verdicts[-1].channel)) is not None:
+    if verdicts and (part := _stretch(blocks, recorded_channel(verdicts[-1].channel, data.sensors))) is not None:
         frequencies, amplitude = part.amplitude_spectrum()
         low, last = frequencies <= SPECTRUM_HZ, verdicts[-1]
         shown.append(figures.spectrum(
@@ -118,7 +122,7 @@ def live_figures(data: LiveData) -> tuple[str, list[Any]]:
 
 
 def _stretch(blocks: list[SensorBlock], name: str) -> Stretch | None:
-    """Samples of the judged channel in the newest blocks; None without it."""
+    """Samples of a channel in the newest blocks; None without it."""
     found: Channel | None = None
     parts = []
     for block in blocks:

@@ -147,8 +147,26 @@ def poincare(points: NDArray[np.float64], extent: tuple[float, float], title: st
     plot = new_figure(title, f"signal once per revolution [{unit}]", f"a quarter period later [{unit}]", 430,
                       x_range=ranges[0], y_range=ranges[1])
     plot.frame_width = plot.frame_height = 360
+    plot.xaxis.ticker.desired_num_ticks = 4
     plot.scatter(points[:, 0], points[:, 1], size=7, color=LINE_COLOURS[0], line_color="#000000",
                  fill_alpha=np.linspace(0.25, 1.0, len(points)))
+    return plot
+
+
+def orbit(x: NDArray[np.float64], y: NDArray[np.float64], once: NDArray[np.float64], title: str) -> figure:
+    """Path of the tool tip [m] in the plane across its axis, and its place once per revolution (n, 2), later darker."""
+    points = np.concatenate([np.stack([x, y], axis=1), once]) * 1e6
+    middle = (points.max(axis=0) + points.min(axis=0)) / 2
+    half = 0.55 * max(float(np.ptp(points, axis=0).max()), 1e-3)
+    plot = new_figure(title, "x of the tool frame [\u00b5m]", "y of the tool frame [\u00b5m]", 430,
+                      x_range=Range1d(middle[0] - half, middle[0] + half),
+                      y_range=Range1d(middle[1] - half, middle[1] + half))
+    plot.frame_width = plot.frame_height = 360
+    plot.line(1e6 * x, 1e6 * y, color=LINE_COLOURS[5], line_width=1, legend_label="path")
+    if len(once):
+        plot.scatter(1e6 * once[:, 0], 1e6 * once[:, 1], size=7, color=LINE_COLOURS[0], line_color="#000000",
+                     fill_alpha=np.linspace(0.25, 1.0, len(once)), legend_label="once per revolution")
+    legend_right(plot)
     return plot
 
 

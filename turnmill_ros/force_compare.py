@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from turnmill_core.cutting.scale import ScaleEstimate
+from turnmill_core.monitoring.sensors import calibrate
 from turnmill_core.operation import Operation
 from turnmill_ros import topics
 from turnmill_ros.analysis import trusted
@@ -62,7 +63,9 @@ def compare(
         if topic in wrenches:
             found = comparison.add_wrench(topic, message)
         elif kind is topics.SENSOR_BLOCKS:
-            found = comparison.add_block(block_from_message(message))
+            block = block_from_message(message)
+            held = track.at(block.stamp_ns)
+            found = comparison.add_block(block if held is None else calibrate(held.sensors, block))
         elif kind is topics.OPERATION:
             if operation is None:
                 track.add(time_from_message(message.header.stamp), operation_from_message(message))

@@ -9,17 +9,23 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from bokeh.embed import components
 from bokeh.models import Range1d
 from bokeh.resources import INLINE
 
-from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_core.monitoring.verdict import ChatterKind, Verdict
 from turnmill_core.operation import Operation
 from turnmill_core.operation_file import describe
+from turnmill_core.operation_sensors import TIP_CHANNELS
 from turnmill_ros import figures
 from turnmill_ros.analysis import CHATTER, Analysis, Segment, iso_time, summary, timeline
 from turnmill_ros.predictions import Predictions
-from turnmill_ros.signals import poincare, spectrogram, stretch
+from turnmill_ros.signals import Stretch, poincare, recorded_channel, spectrogram, stretch
+from turnmill_ros.tip_orbit import TipReader
+
+PATH_TURNS = 10
+"""Revolutions over which a tool tip's path is drawn."""
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222 }
@@ -38,7 +44,9 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
     band = [(analysis.seconds(s.start_ns), analysis.seconds(s.end_ns), s.state) for s in analysis.segments]
     plots.append(("Over time", figures.verdict_band(band, x_range)))
     channel = next((v.channel for v in analysis.verdicts if v.channel), "")
-    picture = spectrogram(analysis.path, channel, start) if channel else None
+    sensors = analysis.operation.sensors
+    reader = tip_reader(analysis)
+    picture = spectrogram(analysis.path, recorded_channel(channel, sensors), start, sensors) if channel else None
     if picture is not None:
         stamped = [((v.window_end_ns - start) * 1e-9, v) for v in analysis.verdicts]
         chatter = [
@@ -54,7 +62,8 @@ def recording_report(output: Path, analysis: Analysis, predictions: Predictions 
         plots += [
             ("Predicted along the way" if k == 0 else "", p) for k, p in enumerate(predictions.plots(start, x_range))
         ]
-    plots += _spectra(analysis, channel)
+    for heading, found in (("Spectra", _spectra(analysis, channel, reader)), ("Tool tip", _orbits(analysis, reader))):
+        plots += [(heading if k == 0 else "", plot) for k, plot in enumerate(found)]
     text = _headline(analysis)
     write_page(output, f"turnmill: {analysis.path.name}", [
         f"<h1>{escape(analysis.operation.name)}</h1>",
@@ -110,9 +119,18 @@ def _summary_table(analysis: Analysis) -> str:
             + f"<p class=note>{escape(counts)}</p>")
 
 
-def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
-    """Spectrum and Poincare set of every state in the cut: up to one second within its longest segment."""
-    plots: list[tuple[str, Any]] = []
+def tip_reader(analysis: Analysis) -> TipReader | None:
+    """Reader of the tool tip's motion with the runout learned in the air that was heard; None without probes for it."""
+    air = [(s.start_ns, s.end_ns) for s in analysis.segments if s.state is ChatterKind.AIR]
+    try:
+        return TipReader(analysis.path, analysis.operation.sensors, air)
+    except ValueError:
+        return None
+
+
+def _stretches(analysis: Analysis) -> list[tuple[ChatterKind, int, Verdict, list[Verdict]]]:
+    """Of every state in the cut up to one second within its longest segment: length [ns], its verdict, all verdicts."""
+    found = []
     for kind in (ChatterKind.STABLE, *CHATTER, ChatterKind.FLIP_OR_RUNOUT):
         segments = [s for s in analysis.segments if s.state is kind]
         if not segments:
@@ -125,21 +143,52 @@ def _spectra(analysis: Analysis, channel: str) -> list[tuple[str, Any]]:
         length = min(
             1_000_000_000, max(longest.end_ns - longest.start_ns, middle.window_end_ns - middle.window_start_ns)
         )
-        part = stretch(analysis.path, channel, middle.window_end_ns - length, middle.window_end_ns)
+        found.append((kind, length, middle, verdicts))
+    return found
+
+
+def _spectra(analysis: Analysis, channel: str, reader: TipReader | None) -> list[Any]:
+    """Spectrum and Poincare set of every state in the cut."""
+    plots: list[Any] = []
+    for kind, length, middle, verdicts in _stretches(analysis):
+        begin, end = middle.window_end_ns - length, middle.window_end_ns
+        part: Stretch | None
+        if channel in TIP_CHANNELS and reader is not None:
+            motion = reader.orbit(begin, end)
+            part = None if motion is None else motion.x if channel == "tip_x" else motion.y
+        else:
+            part = stretch(analysis.path, channel, begin, end, analysis.operation.sensors)
         if part is None:
             continue
         frequencies, amplitude = part.amplitude_spectrum()
-        when = analysis.seconds(middle.window_end_ns)
-        plots.append(("Spectra" if not plots else "", figures.spectrum(
+        when = analysis.seconds(end)
+        plots.append(figures.spectrum(
             frequencies, amplitude, f"{kind.name}: {_named(part.channel)}, {length * 1e-9:.2f} s up to {when:.2f} s",
-            part.channel.unit, middle.tooth_passing_frequency, middle.chatter_family, middle.chatter_frequency)))
+            part.channel.unit, middle.tooth_passing_frequency, middle.chatter_family, middle.chatter_frequency))
         points = poincare(part, verdicts)
         if points is not None:
             low, high = float(part.samples.min()), float(part.samples.max())
             margin = 0.05 * (high - low)
-            plots.append(("", figures.poincare(
+            plots.append(figures.poincare(
                 points, (low - margin, high + margin), f"{kind.name}: Poincar\u00e9 set",
-                part.channel.unit)))
+                part.channel.unit))
+    return plots
+
+
+def _orbits(analysis: Analysis, reader: TipReader | None) -> list[Any]:
+    """Orbit of the tool tip in every state in the cut, from the probes on the shank; none without them."""
+    plots: list[Any] = []
+    for kind, length, middle, _ in _stretches(analysis) if reader is not None else ():
+        motion = None if reader is None else reader.orbit(middle.window_end_ns - length, middle.window_end_ns)
+        if motion is None:
+            continue
+        shown = motion.turns >= motion.turns[-1] - PATH_TURNS
+        remarks = [] if motion.round_off else ["with the shank's runout: no air to learn it from"]
+        remarks += ["a probe is saturated"] if motion.saturated else []
+        title = f"{kind.name}: last {PATH_TURNS} of {np.ptp(motion.turns):.0f} revolutions up to " \
+                f"{analysis.seconds(middle.window_end_ns):.2f} s"
+        plots.append(figures.orbit(motion.x.samples[shown], motion.y.samples[shown], motion.once(),
+                                   "; ".join([title, *remarks])))
     return plots
 
 

@@ -1,17 +1,22 @@
-"""Signals of a bag in pictures' resolution: a bounded spectrogram, and one-second stretches."""
+"""Signals of a bag in pictures' resolution: a bounded spectrogram, and one-second stretches.
+
+Channels in volts that a sensor is known for come calibrated.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from turnmill_core.monitoring.blocks import Channel, SensorBlock
+from turnmill_core.monitoring.blocks import Channel, SensorBlock, Status
 from turnmill_core.monitoring.poincare import poincare_set
+from turnmill_core.monitoring.sensors import calibrate
 from turnmill_core.monitoring.verdict import Verdict
+from turnmill_core.operation_sensors import NO_SENSORS, TIP_CHANNELS, Sensors
 from turnmill_ros import topics
 from turnmill_ros.bag import read_bag
 from turnmill_ros.conversions import block_from_message
@@ -45,10 +50,17 @@ class Stretch:
         return np.fft.rfftfreq(len(self.samples), 1 / self.sample_rate), np.abs(spectrum) * 2 / window.sum()
 
 
-def sensor_blocks(path: Path) -> Iterator[SensorBlock]:
+def sensor_blocks(path: Path, sensors: Sensors) -> Iterator[SensorBlock]:
     """The sensor blocks of a recording in the order in which they were recorded."""
     for _, _, message in read_bag(path, (topics.SENSOR_BLOCKS.name,)):
-        yield block_from_message(message)
+        yield calibrate(sensors, block_from_message(message))
+
+
+def recorded_channel(channel: str, sensors: Sensors) -> str:
+    """The channel of the blocks that shows a judged channel: itself; of the tool tip the first probe along its axis."""
+    if channel not in TIP_CHANNELS:
+        return channel
+    return next((s.name for s in sensors.channels if s.kind == "fibre probe" and s.direction == channel[-1]), channel)
 
 
 def _index(block: SensorBlock, channel: str) -> int | None:
@@ -56,7 +68,9 @@ def _index(block: SensorBlock, channel: str) -> int | None:
     return names.index(channel) if channel in names else None
 
 
-def spectrogram(path: Path, channel: str, start_ns: int, length: int = 1024) -> Spectrogram | None:
+def spectrogram(
+    path: Path, channel: str, start_ns: int, sensors: Sensors = NO_SENSORS, length: int = 1024
+) -> Spectrogram | None:
     """Spectrogram of one channel with at most MAX_COLUMNS columns, whatever the recording's length.
 
     Neighbouring columns are averaged in pairs whenever the limit is passed, so that memory stays
@@ -67,7 +81,7 @@ def spectrogram(path: Path, channel: str, start_ns: int, length: int = 1024) -> 
     merged, pending, pending_stamps = 1, [], []
     rest, window = np.zeros(0), np.hanning(length)
     found: tuple[Channel, float] | None = None
-    for block in sensor_blocks(path):
+    for block in sensor_blocks(path, sensors):
         k = _index(block, channel)
         if k is None:
             continue
@@ -95,26 +109,44 @@ def spectrogram(path: Path, channel: str, start_ns: int, length: int = 1024) -> 
                        10 * np.log10(np.maximum(density, 1e-30)))
 
 
-def stretch(path: Path, channel: str, from_ns: int, to_ns: int) -> Stretch | None:
+def stretch(
+    path: Path, channel: str, from_ns: int, to_ns: int, sensors: Sensors = NO_SENSORS
+) -> Stretch | None:
     """Samples of one channel acquired in [from_ns, to_ns); None where there are fewer than 64 without a gap."""
-    parts: list[NDArray[np.float64]] = []
-    first: tuple[Channel, int, float] | None = None
-    expected = None
-    for block in sensor_blocks(path):
-        k = _index(block, channel)
+    found = stretches(path, (channel,), from_ns, to_ns, sensors)
+    return None if found is None else found[0]
+
+
+def stretches(
+    path: Path, names: Sequence[str], from_ns: int, to_ns: int, sensors: Sensors
+) -> tuple[Stretch, ...] | None:
+    """The blocks with samples of [from_ns, to_ns), one stretch for each of the channels, alike in time.
+
+    A channel has the status flags of all its blocks. None where there are fewer than 64 samples without a gap.
+    """
+    parts: list[SensorBlock] = []
+    for block in sensor_blocks(path, sensors):
         end = block.stamp_ns + round(len(block.samples) / block.sample_rate * 1e9)
-        if k is None or end <= from_ns:
+        if end <= from_ns or any(_index(block, name) is None for name in names):
             continue
         if block.stamp_ns >= to_ns:
             break
-        if expected is not None and block.first_sample != expected:
-            parts, first = [], None
-        expected = block.end_sample
-        first = first or (block.channels[k], block.stamp_ns, block.sample_rate)
-        parts.append(block.samples[:, k].astype(np.float64))
-    if first is None or sum(map(len, parts)) < 64:
+        if parts and block.first_sample != parts[-1].end_sample:
+            parts = []
+        parts.append(block)
+    if sum(len(b.samples) for b in parts) < 64:
         return None
-    return Stretch(first[0], first[1], first[2], np.concatenate(parts))
+    columns = [[_index(b, name) or 0 for name in names] for b in parts]
+    samples = np.concatenate([b.samples[:, c] for b, c in zip(parts, columns, strict=True)]).astype(np.float64)
+    found = []
+    for k in range(len(names)):
+        channels = [b.channels[c[k]] for b, c in zip(parts, columns, strict=True)]
+        flags = Status.OK
+        for channel in channels:
+            flags |= channel.status
+        found.append(Stretch(replace(channels[0], status=flags), parts[0].stamp_ns, parts[0].sample_rate,
+                             samples[:, k]))
+    return tuple(found)
 
 
 def poincare(part: Stretch, verdicts: Sequence[Verdict]) -> NDArray[np.float64] | None:

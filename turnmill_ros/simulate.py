@@ -53,10 +53,10 @@ def simulate_to_bag(
 ) -> Simulated:
     """Simulate the operation's schedule and write the inputs of the suite to `path`, the truth to NAME.truth.json.
 
-    duration [s] (None: the schedule's); sample_rate [Hz] (None: 12.8 kHz); channels: how many of CHANNELS, or
-    their names, in SI units (None: all sensors of the operation, in volts, or 2 where it has none); config: replaces sample_rate, channels and start_ns; progress: called with the share done, 0 to
-    1. A block is recorded when its last sample is acquired, an axis state at its stamp, so a replay has the timing of
-    the live machine.
+    duration [s] (None: the schedule's); sample_rate [Hz] (None: 12.8 kHz); channels: how many of CHANNELS, or their
+    names, in SI units (None: all sensors of the operation, in volts, or 2 where it has none); config: replaces
+    sample_rate, channels and start_ns; progress: called with the share done, 0 to 1. A block is recorded when its last
+    sample is acquired, an axis state at its stamp, so a replay has the timing of the live machine.
 
     Raises InputError where an output exists or the disk is full, ValueError for a value out of bounds.
     """

@@ -39,8 +39,8 @@ def signals_of(sensors: Sensors) -> tuple[str, ...]:
 
 def channels_of(sensors: Sensors) -> tuple[Channel, ...]:
     """Channels in volts, one for each sensor."""
-    return tuple(Channel(s.name, "voltage", "V", s.kind if s.kind == "microphone" else f"{s.kind}, {s.direction}_T")
-                 for s in sensors.channels)
+    places = ("machine enclosure" if s.kind == "microphone" else f"{s.kind}, {s.direction}_T" for s in sensors.channels)
+    return tuple(Channel(s.name, "voltage", "V", place) for s, place in zip(sensors.channels, places, strict=True))
 
 
 def volts(

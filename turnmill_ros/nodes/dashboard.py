@@ -49,6 +49,7 @@ class Dashboard(Node):
         """Show another operation."""
         operation = operation_from_message(message)
         config = config_from_operation(operation)
+        self._data.sensors = operation.sensors
         self._data.operation, self._data.enter, self._data.leave = (
             operation.name, config.enter_ratio, config.leave_ratio)
 

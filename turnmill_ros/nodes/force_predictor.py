@@ -13,6 +13,7 @@ from turnmill_core.cutting.along_path import Method
 from turnmill_core.cutting.loads import CuttingLoads
 from turnmill_core.cutting.scale import ScaleEstimate
 from turnmill_core.machine.conditions import nominal_axes
+from turnmill_core.monitoring.sensors import calibrate
 from turnmill_core.operation import Operation
 from turnmill_ros import topics
 from turnmill_ros.conversions import (
@@ -109,9 +110,14 @@ class ForcePredictor(LifecycleNode):
 
     def on_block(self, data: bytes) -> None:
         """Take measured force, torque and power of a serialized block; one without them is not decoded."""
-        if measures(data, UNITS):
+        first = self._operations.first
+        volts = first is not None and any(s.kind == "dynamometer" for s in first.sensors.channels)
+        if measures(data, (*UNITS, "voltage") if volts else UNITS):
             block = block_from_message(deserialize_message(data, ros_types()[topics.SENSOR_BLOCKS.type]))
-            self._publish(self._comparison.add_block(block), self._operations.at(block.stamp_ns))
+            operation = self._operations.at(block.stamp_ns)
+            if operation is not None:
+                block = calibrate(operation.sensors, block)
+            self._publish(self._comparison.add_block(block), operation)
 
     def on_wrench(self, message: Any) -> None:
         """Take a measured force."""
