@@ -9,12 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnmill_core.detection.bench import FULL, Tally, curves, run, tally
+from turnmill_core.detection.bench import FULL, Tally, run, tally
+from turnmill_core.detection.comparison import curves, false_alarms, roc_area
 from turnmill_core.detection.cuts import KINDS, TRAIN_END, make_cut
 from turnmill_core.detection.endless import go_on
 from turnmill_core.detection.hearing import INDICATORS, Heard, hear_cut, wrong_prior
 from turnmill_core.detection.recordings import RATE, Episode, Motion, episode, observe, simulate_cut, true_kind
-from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_core.detection.rivals import RIVALS, open_gate
+from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
 from turnmill_core.prediction import PredictedType
 
 
@@ -26,8 +28,8 @@ def heard(states: str, truth: str, scores: list[float] | None = None, **changes:
     table[:, 0] = scores or [1.5 if s in "HF" else 0.1 for s in states]
     made = Heard("chatter", 1, 4, 0.05 * count, 0.05 * (1 + np.arange(count)),
                  np.array([codes[c] for c in truth], dtype=np.int8),
-                 np.array([codes[c] for c in states], dtype=np.int8), table, None, 0.01, math.nan,
-                 np.zeros(0, dtype=np.int8))
+                 np.array([codes[c] for c in states], dtype=np.int8), table, table[:, 1:], None, 0.01,
+                 (0.01,) * len(RIVALS), math.nan, np.zeros(0, dtype=np.int8))
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -52,12 +54,71 @@ def test_chatter_is_found_when_the_verdict_stands_in_time() -> None:
     assert ramp.tripled == pytest.approx((0.05, 0.05))
 
 
-def test_curves_count_runs_of_two_windows_at_equal_recall() -> None:
-    scores = [0.9, 0.1, 0.9, 0.9, 0.1, 0.1, 0.8, 0.8, 0.85, 0.95]
-    recalls, false_at = curves([heard("SSSSSSHHHH", "SSSSSSHHHH", scores)], count=4)
-    hours = 6 * 0.05 / 3600
-    assert recalls == pytest.approx([0.025, 0.35, 0.675, 1.0])
-    assert false_at[:, 0] * hours == pytest.approx([0, 1, 1, 1])
+def test_alarms_long_before_chatter_are_false() -> None:
+    h = heard("S" * 20, 14 * "S" + 6 * "H")
+    on = np.zeros(20, dtype=bool)
+    on[8:] = True
+    assert false_alarms(h, on) == []
+    on[7] = True
+    assert false_alarms(h, on) == [(7, 19)]
+
+
+def test_curves_give_false_alarms_at_the_threshold_that_finds_so_many_episodes() -> None:
+    quiet = [0.9, 0.1, 0.7, 0.8, 0.1, 0.1, 0.4, 0.4, 0.4]
+    true = Episode(ChatterKind.HOPF, 0.2, 0.3, 0.25)
+    signals = [heard("SSSSHHHHHH", "----HHHHHH", [0.0] * 4 + [peak] * 6, episode=true) for peak in (0.9, 0.6, 0.2, 0.0)]
+    recalls, false_at = curves([heard("S" * 9, "S" * 9, quiet), *signals])
+    hours = 9 * 0.05 / 3600
+    assert recalls == pytest.approx([0.25, 0.5, 0.75, 1.0])
+    assert false_at[:3, 0] * hours == pytest.approx([0, 1, 2])
+    assert math.isnan(false_at[3, 0])
+    assert np.isnan(false_at[:, 1]).all()
+
+
+def test_thresholds_lower_down_join_alarms_and_count_no_fewer() -> None:
+    true = Episode(ChatterKind.HOPF, 0.2, 0.3, 0.25)
+    quiet = heard("S" * 8, "S" * 8, [0.9, 0.9, 0.1, 0.1, 0.9, 0.9, 0.1, 0.1])
+    signals = [heard("SSSSHHHHHH", "----HHHHHH", [0.0] * 4 + [peak] * 6, episode=true) for peak in (0.9, 0.1)]
+    _, false_at = curves([quiet, *signals])
+    assert false_at[:, 0] * 8 * 0.05 / 3600 == pytest.approx([2, 2])
+
+
+def test_roc_area() -> None:
+    assert roc_area([0, 0, 1, 1], [1, 2, 3, 4]) == 1.0
+    assert roc_area([0, 0, 1, 1], [4, 3, 2, 1]) == 0.0
+    assert roc_area([0, 1, 0, 1], [1, 1, 2, 2]) == 0.5
+    assert math.isnan(roc_area([1, 1], [1, 2]))
+    rng = np.random.default_rng(1)
+    a, b = rng.normal(0, 1, 4000), rng.normal(1, 1, 4000)
+    expected = 0.5 * math.erfc(-1 / 2)
+    assert roc_area(np.r_[np.zeros(4000), np.ones(4000)], np.r_[a, b]) == pytest.approx(expected, abs=0.02)
+
+
+def test_indicators_stand_beside_ours_at_their_thresholds() -> None:
+    table = np.zeros((20, len(INDICATORS)), dtype=np.float32)
+    table[8:, 1:] = [r.threshold for r in RIVALS]
+    table[8:11, 1] = 0
+    true = Episode(ChatterKind.HOPF, 0.3, 0.5, 0.6)
+    chatter = heard("SSSSSSHHHHHHHHHHHHHH", "SSSSSS" + 14 * "H", episode=true)
+    chatter = replace(chatter, scores=table, ungated=table[:, 1:])
+    free = np.repeat([r.threshold for r in RIVALS], 20).reshape(-1, 20).T.astype(np.float32)
+    quiet = replace(heard("S" * 20, "S" * 20), scores=table, ungated=free)
+    ours, fft, *others = tally([chatter, quiet, replace(chatter, kind="ramp")]).standings
+    assert (ours.false_alarms, ours.hopf, ours.before_tripled) == (0, (1, 1), 1)
+    assert (fft.false_alarms, fft.ungated, fft.hopf) == (1, 1, (1, 1))
+    assert fft.delays == pytest.approx((0.35,))
+    assert fft.before_tripled == 0
+    assert [s.delays[0] for s in others] == pytest.approx([0.2] * 3)
+
+
+def test_gate_opens_where_a_window_is_twice_as_loud_as_the_air() -> None:
+    def window(level: float, kind: ChatterKind) -> Verdict:
+        return Verdict(0, 1, 1, "d", 1, "c", kind, Reason.NONE, "", level=level)
+
+    air = [window(1.0, ChatterKind.AIR)] * 4
+    found = open_gate([window(9.0, ChatterKind.STABLE), *air, window(1.9, ChatterKind.STABLE),
+                       window(2.1, ChatterKind.STABLE), *[window(2.5, ChatterKind.AIR)] * 3])
+    assert found.tolist() == [True, True, False, False, False, False, True, True, True, True]
 
 
 def test_even_teeth_need_a_prior_and_odd_ones_do_not() -> None:
@@ -131,7 +192,8 @@ def test_monitor_hears_chatter_and_nothing_else() -> None:
     both = tally([found, stable])
     assert both.false_alarms == 0
     assert both.hopf[0] == both.hopf[1] >= 1
-    assert both.areas[0] >= max(both.areas[1:])
+    assert both.standings[0].area >= 0.99
+    assert found.ungated.shape == (len(found.state), len(RIVALS))
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +211,7 @@ def test_the_whole_corpus(whole: Tally) -> None:
     assert whole.half_order_prior[0] >= 0.9 * whole.half_order_prior[1] > 0
     assert whole.half_order[0] >= 0.9 * whole.half_order[1] > 0
     assert float(np.nanmedian(whole.delays)) < 0.3
-    assert whole.areas[0] > max(whole.areas[1:])
+    assert all(whole.standings[0].false_alarms < s.false_alarms for s in whole.standings[1:])
 
 
 @pytest.mark.slow

@@ -22,18 +22,14 @@ from turnmill_core.detection.recordings import (
     simulate_cut,
     true_kinds,
 )
-from turnmill_core.monitoring.baselines import (
-    fft_energy_ratio,
-    kalman_energy_ratios,
-    once_per_revolution_variance,
-)
+from turnmill_core.detection.rivals import RIVALS, rate_windows
 from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operation, finish, initial, update
 from turnmill_core.monitoring.verdict import ChatterKind, Verdict
 from turnmill_core.operation import Operation
 from turnmill_core.prediction import Prior, flip_multiplier
 from turnmill_core.stability.margin import stability_point
 
-INDICATORS = ("turnmill", "FFT energy ratio", "once-per-revolution variance", "Kalman comb")
+INDICATORS = ("turnmill", *(r.name for r in RIVALS))
 ALARMS = (ChatterKind.HOPF, ChatterKind.FLIP)
 NO_TRUTH = -1
 TACHOMETER_ERROR = 0.01
@@ -45,8 +41,9 @@ class Heard:
     """One signal: what was said and what was true.
 
     kind, number, teeth: of the cut; seconds: of signal; ends (n,): of the windows [s]; truth (n,): true kind
-    or NO_TRUTH; state (n,): verdict; scores (n, 4): one column per INDICATORS; episode: the true chatter, if any; cpu:
-    of the monitor [s]; changed: windows whose state is another with a tachometer that is 1 % wrong (NaN: not asked);
+    or NO_TRUTH; state (n,): verdict; scores (n, INDICATORS): ours, see :func:`score`, and those of the RIVALS with the
+    gate; ungated (n, RIVALS): theirs without; episode: the true chatter, if any; cpu: of the monitor [s]; rival_cpu:
+    of the RIVALS; changed: windows whose state is another with a tachometer that is 1 % wrong (NaN: not asked);
     with_prior (n,): verdict with a prior from a wrong model (empty: not asked).
     """
 
@@ -58,8 +55,10 @@ class Heard:
     truth: NDArray[np.int8]
     state: NDArray[np.int8]
     scores: NDArray[np.float32]
+    ungated: NDArray[np.float32]
     episode: Episode | None
     cpu: float
+    rival_cpu: tuple[float, ...]
     changed: float
     with_prior: NDArray[np.int8]
 
@@ -95,37 +94,28 @@ def predicted(op: Operation) -> Prior:
 
 
 def score(verdict: Verdict) -> float:
-    """How strongly a verdict speaks of chatter: 1 to 2 for an alarm, below 1 for all others."""
+    """How strongly a verdict speaks of chatter, from its published fields: expected share of the energy in chatter.
+
+    The asynchronous or the half-order ratio, whichever is larger, times the probability of chatter: the
+    confidence of an alarm, one half where the verdict is undecided, and what is left to the confidence of all others.
+    """
+    ratio = max(0.0, *(r for r in (verdict.asynchronous_ratio, verdict.half_order_ratio, 0.0) if math.isfinite(r)))
     if verdict.state in ALARMS:
-        return 1 + verdict.confidence
-    if verdict.state is ChatterKind.UNKNOWN:
-        return 0.0
-    return 1 - verdict.confidence if verdict.state in (ChatterKind.AIR, ChatterKind.STABLE) else 0.9
-
-
-def rivals(seen: Observed, verdicts: Sequence[Verdict]) -> NDArray[np.float32]:
-    """Published indicators (n, 3) for the windows of verdicts, at the speed that our monitor found."""
-    ends = [v.last_sample + 1 for v in verdicts]
-    found = np.zeros((len(verdicts), len(INDICATORS) - 1), dtype=np.float32)
-    samples = seen.samples.astype(np.float64)
-    for k, v in enumerate(verdicts):
-        x = samples[max(0, round(v.window_start_ns * 1e-9 * RATE)): ends[k]]
-        if len(x) > RATE // 20 and v.spindle_speed > 0:
-            frequency = v.spindle_speed / (2 * math.pi)
-            found[k, 0] = fft_energy_ratio(x, float(RATE), frequency)
-            found[k, 1] = np.nan_to_num(once_per_revolution_variance(x, float(RATE), frequency))
-    found[:, 2] = kalman_energy_ratios(samples, seen.turns, ends, RATE // 5)
-    return found
+        return 1 + verdict.confidence * ratio
+    if verdict.state in (ChatterKind.MARGINAL, ChatterKind.FLIP_OR_RUNOUT):
+        return 0.5 * ratio
+    return (1 - verdict.confidence) * ratio
 
 
 def _heard(cut: Cut, seen: Observed, config: ChatterConfig) -> tuple[Heard, list[Verdict]]:
     begin = time.process_time()
     verdicts = listen(config, seen)
     cpu = time.process_time() - begin
-    scores = np.column_stack([np.array([score(v) for v in verdicts], dtype=np.float32), rivals(seen, verdicts)])
+    rated = rate_windows(seen, cut.operation.tool.teeth, verdicts)
+    scores = np.column_stack([np.array([score(v) for v in verdicts], dtype=np.float32), rated.gated])
     return Heard(cut.kind, cut.number, cut.operation.tool.teeth, len(seen.samples) / RATE,
                  np.array([v.window_end_ns * 1e-9 for v in verdicts]), np.zeros(0, dtype=np.int8), _states(verdicts),
-                 scores, None, cpu, math.nan, np.zeros(0, dtype=np.int8)), verdicts
+                 scores, rated.ungated, None, cpu, rated.cpu, math.nan, np.zeros(0, dtype=np.int8)), verdicts
 
 
 def _states(verdicts: Sequence[Verdict]) -> NDArray[np.int8]:

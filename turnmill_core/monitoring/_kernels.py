@@ -14,7 +14,7 @@ Complexes = NDArray[np.complex128]
 
 @njit(cache=True)
 def kalman_comb(x: Floats, turns: Floats, harmonics: int, gain: float) -> Floats:
-    """What a comb of tracked harmonics leaves of x (n,): see baselines.kalman_energy_ratio.
+    """What a comb of tracked harmonics leaves of x (n,): see baselines.kalman_energy_ratios.
 
     turns (n,): revolutions at the samples. Harmonic k is a rotating complex state, corrected at each sample by 2 gain
     times the innovation; all turn by powers of one rotation a sample.

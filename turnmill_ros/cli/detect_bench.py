@@ -30,7 +30,14 @@ def detect_bench(
     from dataclasses import replace
 
     from turnmill_core.detection.bench import FULL, QUICK, run, tally
-    from turnmill_ros.detection_report import confusion_rows, detection_report, figures_json, summary_rows
+    from turnmill_ros.detection_report import (
+        behind,
+        comparison_rows,
+        confusion_rows,
+        detection_report,
+        figures_json,
+        summary_rows,
+    )
 
     plan = QUICK if quick else FULL
     if hours is not None:
@@ -51,5 +58,7 @@ def detect_bench(
     header, rows = confusion_rows(found)
     table("Windows by what they truly are (rows) and what was said", header, rows)
     table("Detection", ("what", "found", "wanted"), summary_rows(found))
+    table("Beside published indicators, each at its operating point", *comparison_rows(found))
+    console.print(f"fewer false alarms than ours: {'; '.join(behind(found)) or 'none, at any recall'}")
     if report is not None:
         console.print(f"report: {report}", soft_wrap=True)
