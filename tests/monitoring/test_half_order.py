@@ -36,8 +36,8 @@ def config(times: float, half: float = 0.5, teeth: int = 2) -> ChatterConfig:
     (1.1 * ABOVE, Prior(0, PredictedType.UNKNOWN, math.nan), ChatterKind.FLIP, Reason.ABOVE_RUNOUT),
     (1.1 * ABOVE, FLIP, ChatterKind.FLIP, Reason.PRIOR_FLIP),
     (1.1 * ABOVE, STABLE, EITHER, Reason.CONTRADICTION),
-    (2 * WITHIN, FLIP, ChatterKind.FLIP, Reason.PRIOR_FLIP),
-    (2 * WITHIN, STABLE, ChatterKind.STABLE, Reason.PRIOR_RUNOUT),
+    (1.4 * WITHIN, FLIP, ChatterKind.FLIP, Reason.PRIOR_FLIP),
+    (1.4 * WITHIN, STABLE, ChatterKind.STABLE, Reason.PRIOR_RUNOUT),
     (0.5, STABLE, ChatterKind.STABLE, Reason.PRIOR_RUNOUT),
     (0.5, FLIP, EITHER, Reason.CONTRADICTION),
 ])
