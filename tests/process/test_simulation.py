@@ -14,7 +14,7 @@ from tests.process.cases import BENCHMARK_MODE, RPM, SILENT, at, exact_config, m
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.operation import Mode, Operation, SchedulePoint
-from turnmill_core.process.simulation import Chunk, SimulationConfig, initial, simulate, step
+from turnmill_core.process.simulation import Chunk, SimulationConfig, block_due_ns, initial, simulate, step
 from turnmill_core.process.truth import join_truth
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -51,6 +51,17 @@ def test_chunks_do_not_change_a_bit(sizes: list[int]) -> None:
     assert np.abs(whole[-500:, 1]).max() > 1e-6
     np.testing.assert_array_equal(whole, cut)
     assert whole_index == cut_index == [256 * i for i in range(9)]
+
+
+def test_a_block_comes_with_the_first_axis_state_that_reaches_its_time() -> None:
+    state, due = initial(ramping(), CONFIG, 7), []
+    for axes in AXES:
+        before = block_due_ns(CONFIG, state)
+        state, chunk = step(CONFIG, state, [axes])
+        assert len(chunk.blocks) == (axes.stamp_ns >= before)
+        due += [before - b.stamp_ns for b in chunk.blocks]
+    assert len(due) == 9
+    assert 19_900_000 < min(due) <= max(due) < 23_000_000
 
 
 def test_the_truth_does_not_depend_on_chunks_either() -> None:

@@ -147,6 +147,15 @@ def step(
     return _finish_chunk(config, *_integrate(config, state, knots, around), chunk)
 
 
+def block_due_ns(config: SimulationConfig, state: SimulationState) -> int:
+    """Stamp [ns] that axis states must reach for the next block to come out of `step`; before the first: since it.
+
+    That of the block's last sample, and what the anti-alias filter looks ahead.
+    """
+    last = state.next_block + config.block_samples - 1
+    return state.base_ns + round((last * config.ratio + len(state.model.taps) // 2) * state.model.dt * 1e9)
+
+
 def simulate(
     op: Operation, config: SimulationConfig, seed: int, axes_at: Callable[[float, int], AxisState] | None = None,
     duration: float | None = None, engagement_at: Callable[[AxisState], Engagement] | None = None,

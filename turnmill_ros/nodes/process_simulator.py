@@ -10,7 +10,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.controller import axis_state_at
 from turnmill_core.operation import Operation
-from turnmill_core.process.simulation import SimulationConfig, SimulationState, initial, step
+from turnmill_core.process.simulation import SimulationConfig, SimulationState, block_due_ns, initial, step
 from turnmill_ros import topics
 from turnmill_ros.conversions import axes_from_message, block_to_message
 from turnmill_ros.interfaces import ros_types
@@ -33,11 +33,11 @@ SETTINGS = {
 
 
 class ProcessSimulator(LifecycleNode):
-    """Integrates the cut over the axis states of one block at a time; says so when it falls behind them."""
+    """Integrates the cut as soon as axis states cover a block; says so when it falls behind them."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("process_simulator", **kwargs)
-        default = SimulationConfig(sample_rate=51200)
+        default = SimulationConfig(sample_rate=51200, truth=False)
         self._config = replace(default, **declare_config(self, default, SETTINGS))
         self._seed = declare(self, "seed", 0, "seed of all noise", low=0)
         self._allowed = declare(self, "allowed_lag", 0.25, "s, lag behind the axis states that is a warning", low=0.05)
@@ -45,6 +45,7 @@ class ProcessSimulator(LifecycleNode):
         self._operations, self._running = OperationTrack(), None
         self._state: SimulationState | None = None
         self._axes: list[AxisState] = []
+        self._due_ns = 0
         self._sent, self._lag, self._most_lag = 0, 0.0, 0.0
         self._publisher = support.publisher(self, topics.SENSOR_BLOCKS, keep_all=lossless)
         self.diagnostics = support.Diagnostics(self, self._values, self._warning)
@@ -66,7 +67,7 @@ class ProcessSimulator(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> None:
         """Wait for axis states."""
         support.wait_until_matched(self, self._match)
-        self._running, self._axes = None, []
+        self._running, self._axes, self._due_ns = None, [], 0
         self.diagnostics.enter(support.ACTIVE)
 
     @support.transition
@@ -77,9 +78,9 @@ class ProcessSimulator(LifecycleNode):
         self.diagnostics.enter("stopped", done=True)
 
     def on_axes(self, message: Any) -> None:
-        """Integrate once the axis states cover a block."""
+        """Integrate once the axis states cover a block and what its filter looks ahead."""
         self._axes.append(axes_from_message(message))
-        if self._axes[-1].stamp_ns - self._axes[0].stamp_ns >= self._config.block_duration * 1e9 - 1:
+        if self._axes[-1].stamp_ns >= self._due_ns:
             axes, self._axes = self._axes, []
             try:
                 self._advance(axes)
@@ -92,6 +93,7 @@ class ProcessSimulator(LifecycleNode):
         if operation is not self._running:
             self._begin(operation)
         self._state, chunk = step(self._config, self._state, axes)
+        self._due_ns = block_due_ns(self._config, self._state)
         for block in chunk.blocks:
             support.send(self._publisher, block_to_message(block, ros_types()))
             self._sent += 1
