@@ -25,6 +25,11 @@ def _share(part: tuple[int, int]) -> str:
     return f"{100 * part[0] / part[1]:.1f} % of {part[1]}" if part[1] else "none asked"
 
 
+def _of_three(part: tuple[int, int, int]) -> str:
+    right, undecided, count = part
+    return f"{_share((right, count))}, {100 * undecided / count:.1f} % undecided" if count else "none asked"
+
+
 def summary_rows(found: Tally) -> list[tuple[str, str, str]]:
     """What, found, wanted."""
     delays = found.delays
@@ -36,6 +41,7 @@ def summary_rows(found: Tally) -> list[tuple[str, str, str]]:
         ("period two, odd teeth, found likewise", _share(found.flip_odd), "at least 90 %"),
         ("flip or runout, even teeth, prior of a wrong model", _share(found.half_order_prior), "at least 90 %"),
         ("flip, even teeth, without a prior: FLIP_OR_RUNOUT", _share(found.half_order), "at least 90 %"),
+        ("flip or runout, even teeth, runout known to 20 %", _of_three(found.half_order_runout), ""),
         ("alarm on depth ramps after 20 %, median", f"{_median(found.delays):.3f} s" if len(delays) else "none asked",
          f"at most {LATE:g} s"),
         ("alarm on depth ramps before tripled", _share((found.standings[0].before_tripled, len(delays))), "all"),
@@ -92,6 +98,7 @@ def figures_json(plan: Plan, found: Tally) -> dict[str, Any]:
             ("hopf", found.hopf), ("period_two_odd_teeth", found.flip_odd),
             ("half_order_with_prior", found.half_order_prior), ("half_order_without_prior", found.half_order),
             ("changed_by_tachometer", found.changed))},
+        "half_order_with_known_runout": dict(zip(("right", "undecided", "of"), found.half_order_runout, strict=True)),
         "ramp_delays_s": list(found.delays), "ramp_tripled_s": list(found.tripled),
         "ramp_delay_median_s": _finite(_median(found.delays)),
         "indicators": {s.name: _standing_json(s) for s in found.standings},

@@ -11,9 +11,10 @@ import pytest
 
 from turnmill_core.detection.bench import FULL, Tally, run, tally
 from turnmill_core.detection.comparison import curves, false_alarms, roc_area
-from turnmill_core.detection.cuts import KINDS, TRAIN_END, make_cut
+from turnmill_core.detection.cuts import KINDS, TRAIN_END, make_cut, much_runout
 from turnmill_core.detection.endless import go_on
 from turnmill_core.detection.hearing import INDICATORS, Heard, hear_cut, wrong_prior
+from turnmill_core.detection.known_runout import decided_by_runout, measured
 from turnmill_core.detection.recordings import RATE, Episode, Motion, episode, observe, simulate_cut, true_kind
 from turnmill_core.detection.rivals import RIVALS, open_gate
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
@@ -126,6 +127,25 @@ def test_even_teeth_need_a_prior_and_odd_ones_do_not() -> None:
     found = tally([even, heard("HHHH", "HHHH")])
     assert found.half_order_prior == (3, 4)
     assert found.half_order == (2, 2)
+    runout = tally([replace(even, by_runout=(5, 1, 7)), replace(even, by_runout=(2, 2, 4))])
+    assert runout.half_order_runout == (7, 3, 11)
+
+
+def test_known_runout_decides_without_a_prior() -> None:
+    """Training cuts: one of two teeth that flips, one whose runout looks like it."""
+    for kind, number in (("flip_even", 6), ("runout", 6)):
+        right, undecided, count = decided_by_runout(kind, number)
+        assert 0.9 * count < right <= count - undecided
+        assert count > 20
+
+
+def test_measured_runout_is_wrong_and_the_same_again() -> None:
+    cut = much_runout(make_cut("flip_even", 3))
+    op, own = measured(cut), cut.operation
+    assert op == measured(cut)
+    assert cut.operation.tool.runout != make_cut("flip_even", 3).operation.tool.runout
+    off = [a / b for a, b in zip(op.tool.runout, own.tool.runout, strict=True)] + [op.material.Ktc / own.material.Ktc]
+    assert all(0.8 <= ratio <= 1.2 and ratio != 1 for ratio in off)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -210,6 +230,9 @@ def test_the_whole_corpus(whole: Tally) -> None:
     assert whole.flip_odd[0] >= 0.9 * whole.flip_odd[1] > 0
     assert whole.half_order_prior[0] >= 0.9 * whole.half_order_prior[1] > 0
     assert whole.half_order[0] >= 0.9 * whole.half_order[1] > 0
+    right, undecided, count = whole.half_order_runout
+    assert right > 0.8 * count
+    assert count - right - undecided < 0.05 * count
     assert float(np.nanmedian(whole.delays)) < 0.3
     assert all(whole.standings[0].false_alarms < s.false_alarms for s in whole.standings[1:])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from turnmill_core.detection.comparison import (
 from turnmill_core.detection.cuts import KINDS, TRAIN_END
 from turnmill_core.detection.endless import QUIET_KINDS, SECONDS, TRIED, quiet_motion
 from turnmill_core.detection.hearing import NO_TRUTH, Heard, hear_cut, hear_quiet
+from turnmill_core.detection.known_runout import EVEN_KINDS, decided_by_runout
 from turnmill_core.monitoring.verdict import ChatterKind
 
 PARTS = 10
@@ -55,7 +56,8 @@ class Tally:
     confusion (7, 7): windows by true kind (rows) and verdict. false_alarms, hours, undecided: alarms without chatter
     in all signals that truly have none, the hours of them, and runs of FLIP_OR_RUNOUT there. hopf, flip_odd: (found,
     episodes) with the right verdict within 0.3 s of full amplitude. half_order_prior, half_order: (right, windows) of
-    half-order lines with an even number of teeth, with a wrong model's prior and without (flips only).
+    half-order lines with an even number of teeth, with a wrong model's prior and without (flips only);
+    half_order_runout: (right, undecided, windows) with a runout known to 20 % and no prior.
     delays, tripled: of every ramp, alarm after the 20 % crossing [s] (NaN: none), and time from crossing to tripled.
     changed: (windows whose verdict changes, windows) with the tachometer 1 % wrong. standings: ours and published
     indicators side by side; recalls (r,), false_at (r, indicators): false alarms per hour at each recall. missed,
@@ -70,6 +72,7 @@ class Tally:
     flip_odd: tuple[int, int]
     half_order_prior: tuple[int, int]
     half_order: tuple[int, int]
+    half_order_runout: tuple[int, int, int]
     delays: tuple[float, ...]
     tripled: tuple[float, ...]
     changed: tuple[int, int]
@@ -107,7 +110,9 @@ def hear(task: tuple[str, str, int]) -> list[Heard]:
     if what == "quiet":
         motion = quiet_motion(kind, number)
         return [hear_quiet(kind, number, part, motion) for part in range(PARTS)]
-    return [hear_cut(kind, number, tachometer=True, prior=kind in ("flip_even", "runout"))]
+    even = kind in EVEN_KINDS
+    heard = hear_cut(kind, number, tachometer=True, prior=even)
+    return [replace(heard, by_runout=decided_by_runout(kind, number)) if even else heard]
 
 
 def tally(found: Sequence[Heard]) -> Tally:
@@ -128,6 +133,7 @@ def tally(found: Sequence[Heard]) -> Tally:
         sum(_undecided(h) for h in found),
         (len(hopf) - len(missed[0]), len(hopf)), (len(odd) - len(missed[1]), len(odd)),
         _half_order(found, True), _half_order(found, False),
+        tuple(sum(h.by_runout[k] for h in found) for k in range(3)),  # type: ignore[arg-type]
         stand[0].delays, tuple(h.episode.tripled - h.episode.begin for h in ramps(found) if h.episode),
         (round(sum(h.changed for h in asked)), sum(len(h.state) for h in asked)), stand, recalls, false_at,
         tuple(f"{h.kind} {h.number}" for group in missed for h in group),

@@ -136,6 +136,13 @@ def _runout(kind: str, teeth: int, rng: np.random.Generator) -> tuple[float, ...
     return tuple(float(size * (math.cos(phase + 2 * math.pi * j / teeth) + 0.3 * own[j])) for j in range(teeth))
 
 
+def much_runout(cut: Cut) -> Cut:
+    """The same cut with the teeth run out as much as those of the kind "runout"."""
+    tool = cut.operation.tool
+    runout = _runout("runout", tool.teeth, generator(cut.kind, cut.number, "much runout"))
+    return replace(cut, operation=replace(cut.operation, tool=replace(tool, runout=runout)))
+
+
 def _scheduled(kind: str, number: int, rng: np.random.Generator, op: Operation, limit: float) -> Cut:
     """Case with a schedule of depth: air, entry, then the depth held or ramped."""
     speed, rate = op.conditions.tool_speed, 0.0

@@ -44,7 +44,8 @@ class Heard:
     or NO_TRUTH; state (n,): verdict; scores (n, INDICATORS): ours, see :func:`score`, and those of the RIVALS with the
     gate; ungated (n, RIVALS): theirs without; episode: the true chatter, if any; cpu: of the monitor [s]; rival_cpu:
     of the RIVALS; changed: windows whose state is another with a tachometer that is 1 % wrong (NaN: not asked);
-    with_prior (n,): verdict with a prior from a wrong model (empty: not asked).
+    with_prior (n,): verdict with a prior from a wrong model (empty: not asked); by_runout: windows that a known runout
+    decides rightly, leaves undecided, and all of them, see known_runout.py.
     """
 
     kind: str
@@ -61,6 +62,7 @@ class Heard:
     rival_cpu: tuple[float, ...]
     changed: float
     with_prior: NDArray[np.int8]
+    by_runout: tuple[int, int, int] = (0, 0, 0)
 
 
 def listen(config: ChatterConfig, seen: Observed, prior: Prior | None = None) -> list[Verdict]:
@@ -123,15 +125,19 @@ def _states(verdicts: Sequence[Verdict]) -> NDArray[np.int8]:
 
 
 def hear_cut(kind: str, number: int, tachometer: bool = False, prior: bool = False) -> Heard:
-    """One simulated cut; tachometer, prior: also with a tachometer 1 % wrong, with a prior from a wrong model."""
-    motion = simulate_cut(make_cut(kind, number))
+    """One simulated cut, see :func:`hear_motion`."""
+    return hear_motion(simulate_cut(make_cut(kind, number)), tachometer, prior)
+
+
+def hear_motion(motion: Motion, tachometer: bool = False, prior: bool = False) -> Heard:
+    """Motion of a cut; tachometer, prior: also with a tachometer 1 % wrong, with a prior from a wrong model."""
     cut, config = motion.cut, config_from_operation(motion.cut.operation)
     seen = observe(motion)
     heard, verdicts = _heard(cut, seen, config)
     truth = np.array([NO_TRUTH if k is None else int(k) for k in true_kinds(cut, seen, verdicts)], dtype=np.int8)
     heard = replace(heard, truth=truth, episode=episode(cut, seen))
     if tachometer:
-        sign = 1 if number % 2 else -1
+        sign = 1 if cut.number % 2 else -1
         other = _states(listen(config, observe(motion, sign * TACHOMETER_ERROR)))
         heard = replace(heard, changed=float(np.sum(other != heard.state)))
     if prior:
