@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -9,11 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from turnmill_core.cutting.runout import half_order_share
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.machine.conditions import conditions_from_axes, nominal_axes
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
-from turnmill_core.monitoring.verdict import ChatterKind, SpeedSource, Verdict
+from turnmill_core.monitoring.verdict import ChatterKind, Reason, SpeedSource, Verdict
 from turnmill_core.operation import Operation
+from turnmill_core.operation_cutter import Shape
 from turnmill_core.operation_file import parse_operation, read_operation, shipped_operations
 from turnmill_core.prediction import PredictedType, Prior
 from turnmill_core.stability.margin import stability_point
@@ -174,6 +177,31 @@ def test_computed_predictions_do_not_depend_on_how_topics_interleave() -> None:
     assert {v.prior.predicted_type for v in results[0]} == {expected.predicted_type}
     assert {v.prior.spectral_radius for v in results[0]} == {expected.spectral_radius}
     assert all(0 <= v.prior.stamp_ns - v.window_end_ns <= 24_000_000 for v in results[0])
+
+
+@pytest.mark.parametrize(("runout", "state", "reason"), [
+    (None, ChatterKind.FLIP_OR_RUNOUT, Reason.NO_PRIOR), ("0.5 um", ChatterKind.FLIP, Reason.ABOVE_RUNOUT),
+    ("60 um", ChatterKind.STABLE, Reason.KNOWN_RUNOUT)])
+def test_runout_of_the_operation_decides_without_predictions_live_and_in_replay(
+        runout: str | None, state: ChatterKind, reason: Reason) -> None:
+    text = operation().text
+    op = parse_operation(text if runout is None else text.replace("teeth: 2", f"teeth: 2\n  runout: [{runout}, 0 um]"))
+    live = run(MonitorFeed(FeedSettings(prior="none")), live_steps(op))
+    assert (live[-1].state, live[-1].reason, live[-1].prior) == (state, reason, None)
+    again = interleaved([[lambda feed: feed.operation(START, op)],
+                         [lambda feed, b=b: feed.block(b) for b in blocks(op)],
+                         [lambda feed, a=a: feed.axes(a) for a in axes(op)],
+                         [lambda feed, v=v: feed.recorded(v) for v in live]], 1)
+    assert [repr(v) for v in run(MonitorFeed(FeedSettings("recorded", "recorded")), again)] == [repr(v) for v in live]
+
+
+def test_a_nominal_cut_that_no_model_describes_tells_nothing_of_runout() -> None:
+    op = operation()
+    tool = replace(op.tool, runout=(1e-5, 0.0), shape=Shape(taper_angle=0.05), flute_length=math.inf)
+    with pytest.raises(ValueError, match="flute length"):
+        half_order_share(tapered := replace(op, tool=tool), op.conditions)
+    assert math.isnan(FeedSettings().config(tapered).runout_share)
+    assert math.isnan(FeedSettings().config(op).runout_share)
 
 
 def test_settings_are_checked() -> None:
