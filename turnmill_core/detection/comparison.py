@@ -99,6 +99,11 @@ def in_time(h: Heard, on: Bools) -> bool:
     return bool((on & _growth(h)).any())
 
 
+def peak(h: Heard, indicator: int) -> float:
+    """Highest threshold on the score of an indicator (column) at which the chatter is found in time."""
+    return float(lasting(h.scores[:, indicator])[_growth(h)].max(initial=0.0))
+
+
 def _growth(h: Heard) -> Bools:
     assert h.episode is not None
     return (h.ends >= h.episode.begin - LATE) & (h.ends <= h.episode.full + LATE)
@@ -194,7 +199,7 @@ def curves(found: Sequence[Heard]) -> tuple[NDArray[np.float64], NDArray[np.floa
     false_at = np.full((len(asked), len(INDICATORS)), np.nan)
     without = np.concatenate([np.append(without_chatter(h), False) for h in found])
     for k in range(len(INDICATORS)):
-        peaks = np.sort([lasting(h.scores[:, k])[_growth(h)].max(initial=0.0) for h in asked])[::-1]
+        peaks = np.sort([peak(h, k) for h in asked])[::-1]
         value = np.concatenate([np.append(lasting(h.scores[:, k]), -np.inf) for h in found])
         most = 0
         for i, threshold in enumerate(peaks):

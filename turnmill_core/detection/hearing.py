@@ -41,7 +41,7 @@ class Heard:
     """One signal: what was said and what was true.
 
     kind, number, teeth: of the cut; seconds: of signal; ends (n,): of the windows [s]; truth (n,): true kind
-    or NO_TRUTH; state (n,): verdict; scores (n, INDICATORS): ours, see :func:`score`, and those of the RIVALS with the
+    or NO_TRUTH; state (n,): verdict; scores (n, INDICATORS): ours, see :func:`scores`, and those of the RIVALS with the
     gate; ungated (n, RIVALS): theirs without; episode: the true chatter, if any; cpu: of the monitor [s]; rival_cpu:
     of the RIVALS; changed: windows whose state is another with a tachometer that is 1 % wrong (NaN: not asked);
     with_prior (n,): verdict with a prior from a wrong model (empty: not asked); by_runout: windows that a known runout
@@ -95,18 +95,28 @@ def predicted(op: Operation) -> Prior:
                  flip_multiplier(point.multipliers))
 
 
-def score(verdict: Verdict) -> float:
-    """How strongly a verdict speaks of chatter, from its published fields: expected share of the energy in chatter.
+SUREST = 0.9999
+"""Confidence above which nothing more is made of it."""
 
-    The asynchronous or the half-order ratio, whichever is larger, times the probability of chatter: the
-    confidence of an alarm, one half where the verdict is undecided, and what is left to the confidence of all others.
+
+def scores(verdicts: Sequence[Verdict]) -> NDArray[np.float32]:
+    """How strongly verdicts speak of chatter (n,), from what is published of them up to each window.
+
+    In an alarm: 1 + the sum of -ln(1 - confidence) over its windows so far, the improbability of all of them being
+    wrong. Else below 1: the asynchronous or the half-order ratio, whichever is larger, times the probability of
+    chatter, which is one half where the verdict is undecided and what the confidence leaves of 1 where it is another.
     """
-    ratio = max(0.0, *(r for r in (verdict.asynchronous_ratio, verdict.half_order_ratio, 0.0) if math.isfinite(r)))
-    if verdict.state in ALARMS:
-        return 1 + verdict.confidence * ratio
-    if verdict.state in (ChatterKind.MARGINAL, ChatterKind.FLIP_OR_RUNOUT):
-        return 0.5 * ratio
-    return (1 - verdict.confidence) * ratio
+    found, run = np.zeros(len(verdicts), dtype=np.float32), 0.0
+    for k, v in enumerate(verdicts):
+        if v.state in ALARMS:
+            run -= math.log(1 - min(SUREST, v.confidence))
+            found[k] = 1 + run
+            continue
+        run = 0.0
+        undecided = v.state in (ChatterKind.MARGINAL, ChatterKind.FLIP_OR_RUNOUT)
+        ratio = max((r for r in (v.asynchronous_ratio, v.half_order_ratio) if math.isfinite(r)), default=0.0)
+        found[k] = min(1.0, max(0.0, ratio) * (0.5 if undecided else 1 - v.confidence))
+    return found
 
 
 def _heard(cut: Cut, seen: Observed, config: ChatterConfig) -> tuple[Heard, list[Verdict]]:
@@ -114,10 +124,10 @@ def _heard(cut: Cut, seen: Observed, config: ChatterConfig) -> tuple[Heard, list
     verdicts = listen(config, seen)
     cpu = time.process_time() - begin
     rated = rate_windows(seen, cut.operation.tool.teeth, verdicts)
-    scores = np.column_stack([np.array([score(v) for v in verdicts], dtype=np.float32), rated.gated])
+    table = np.column_stack([scores(verdicts), rated.gated])
     return Heard(cut.kind, cut.number, cut.operation.tool.teeth, len(seen.samples) / RATE,
                  np.array([v.window_end_ns * 1e-9 for v in verdicts]), np.zeros(0, dtype=np.int8), _states(verdicts),
-                 scores, rated.ungated, None, cpu, rated.cpu, math.nan, np.zeros(0, dtype=np.int8)), verdicts
+                 table, rated.ungated, None, cpu, rated.cpu, math.nan, np.zeros(0, dtype=np.int8)), verdicts
 
 
 def _states(verdicts: Sequence[Verdict]) -> NDArray[np.int8]:

@@ -82,12 +82,11 @@ def rate_windows(seen: Observed, teeth: int, verdicts: Sequence[Verdict]) -> Rat
     samples = seen.samples.astype(np.float64)
     ends = [v.last_sample + 1 for v in verdicts]
     begins = [max(0, round(v.window_start_ns * 1e-9 * RATE)) for v in verdicts]
-    fixed = [max(0, end - round(WINDOW * RATE)) for end in ends]
     heard = open_gate(verdicts)
 
-    def each(indicator: Callable[[Floats, Floats], float], first: list[int], short: float = 0.0) -> Floats:
-        return np.array([indicator(samples[a:b], seen.turns[a:b]) if b - a > RATE // 20 else short
-                         for a, b in zip(first, ends, strict=True)])
+    def each(indicator: Callable[[Floats, Floats], float]) -> Floats:
+        return np.array([indicator(samples[a:b], seen.turns[a:b]) if b - a > RATE // 20 else 0.0
+                         for a, b in zip(begins, ends, strict=True)])
 
     def ratio(x: Floats, turns: Floats) -> float:
         return fft_energy_ratio(x, turns, float(RATE))
@@ -96,22 +95,26 @@ def rate_windows(seen: Observed, teeth: int, verdicts: Sequence[Verdict]) -> Rat
         found = once_per_revolution_variance(x, turns)
         return found if math.isfinite(found) else 0.0
 
-    def concentrated(x: Floats, turns: Floats) -> float:
-        return concentration(x, turns, float(RATE))
-
     clock = [time.process_time()]
-    plain = [each(ratio, begins)]
+    plain = [each(ratio)]
     clock.append(time.process_time())
-    plain.append(each(variance, begins))
+    plain.append(each(variance))
     clock.append(time.process_time())
     plain.append(kalman_energy_ratios(samples, seen.turns, float(RATE), teeth, ends, RATE // 5))
     clock.append(time.process_time())
-    new = evidence(each(concentrated, fixed, RANGE[0]))
+    new = evidence(concentrations(seen, ends))
     clock.append(time.process_time())
     gated = [np.where(heard, c, 0.0) for c in plain] + [sequential_test(new, heard, WRONG, WRONG)]
     free = [*plain, sequential_test(new, np.ones(len(new), dtype=bool), WRONG, WRONG)]
     return Rated(np.column_stack(gated).astype(np.float32), np.column_stack(free).astype(np.float32),
                  tuple(float(c) for c in np.diff(clock)))
+
+
+def concentrations(seen: Observed, ends: Sequence[int]) -> Floats:
+    """Concentration of the energy away from spindle harmonics in windows of WINDOW that end before `ends` (n,)."""
+    samples, length = seen.samples.astype(np.float64), round(WINDOW * RATE)
+    return np.array([concentration(samples[max(0, b - length):b], seen.turns[max(0, b - length):b], float(RATE))
+                     if b > length // 2 else RANGE[0] for b in ends])
 
 
 def evidence(concentrations: Floats) -> Floats:
