@@ -16,6 +16,7 @@ from turnmill_core.monitoring.sensors import (
     implausible,
     shank_runout,
     tip_motion,
+    without_orders,
     without_runout,
 )
 from turnmill_core.monitoring.verdict import Reason
@@ -217,3 +218,11 @@ def test_probes_that_cannot_tell_are_refused() -> None:
     with pytest.raises(ValueError, match="along y"):
         Sensors((probe,), judged="tip_y")
     assert Sensors((probe,), judged="tip_x").probes("x") == (probe,)
+
+
+def test_low_orders_are_taken_off_whole() -> None:
+    turns = np.linspace(3.3, 13.1, 3000)
+    low = 5e-5 * np.cos(2 * math.pi * turns + 1) + 2e-6 * np.sin(10 * math.pi * turns) + 1e-3
+    high = 1e-6 * np.cos(2 * math.pi * 13.4 * turns)
+    assert without_orders(low[:, None], turns, 5) == pytest.approx(0, abs=1e-15)
+    assert without_orders((low + high)[:, None], turns, 5)[:, 0] == pytest.approx(high, abs=2e-8)

@@ -84,6 +84,14 @@ def without_runout(displacement: Floats, turns: Floats, runout: Floats) -> Float
     return found
 
 
+def without_orders(displacement: Floats, turns: Floats, orders: int) -> Floats:
+    """Displacement (n, k) [m] less its mean and its best fit at 1 ... orders cycles per revolution; turns (n,)."""
+    angle = 2 * math.pi * turns[:, None] * np.arange(1, orders + 1)
+    base = np.concatenate([np.ones((len(turns), 1)), np.cos(angle), np.sin(angle)], axis=1)
+    found: Floats = displacement - base @ np.linalg.lstsq(base, displacement, rcond=None)[0]
+    return found
+
+
 def tip_motion(sensors: Sensors, axis: str, displacement: Floats, rate: float) -> tuple[Floats, Floats]:
     """Vibration of the tool tip and motion of the casing (n,) [m] along one axis of the tool frame, by mode shape.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.channel import usable
 from turnmill_core.monitoring.config import ChatterConfig
-from turnmill_core.monitoring.sensors import FEWEST_TURNS, shank_runout, tip_motion, without_runout
+from turnmill_core.monitoring.sensors import FEWEST_TURNS, shank_runout, tip_motion, without_orders, without_runout
 from turnmill_core.monitoring.speed import SpindleSpeed
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.verdict import Reason
@@ -26,6 +26,10 @@ Floats = NDArray[np.float64]
 
 KNOWN = 4
 """Windows of air after which the shank's runout is known."""
+
+ROUND_ORDERS = 5
+"""Cycles per revolution of which a shank's out-of-roundness mostly consists: taken off while it is not known, so that
+air is known as air."""
 
 REMEMBERED = 100
 """Windows of air over which it is averaged: a newer one counts for a hundredth at least."""
@@ -92,8 +96,11 @@ def tip_in(config: ChatterConfig, seen: Seen, runout: ShankRunout, rate: float) 
     displacement = seen.displacement
     if not len(displacement):
         return np.zeros(0)
-    if runout.known and runout.table is not None and seen.turns is not None:
-        displacement = without_runout(displacement, seen.turns, runout.table)
+    if seen.turns is not None:
+        if runout.known and runout.table is not None:
+            displacement = without_runout(displacement, seen.turns, runout.table)
+        else:
+            displacement = without_orders(displacement, seen.turns, ROUND_ORDERS)
     tip, _ = tip_motion(config.sensors, config.channel[-1], displacement - displacement.mean(axis=0), rate)
     return tip
 
