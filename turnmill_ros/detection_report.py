@@ -13,7 +13,7 @@ from bokeh.models import FactorRange, Label, LabelSet, Span
 from bokeh.plotting import figure
 
 from turnmill_core.detection.bench import Plan, Tally
-from turnmill_core.detection.comparison import EARLY, LATE, Standing
+from turnmill_core.detection.comparison import EARLY, LATE, Standing, runs
 from turnmill_core.detection.cuts import KINDS, TRAIN_END
 from turnmill_core.detection.hearing import INDICATORS
 from turnmill_core.monitoring.verdict import ChatterKind
@@ -76,8 +76,13 @@ def _median(delays: Sequence[float]) -> float:
 def behind(found: Tally) -> list[str]:
     """Indicators that somewhere have fewer false alarms than we do at the same recall, and where."""
     better = np.nan_to_num(found.false_at, nan=np.inf)
-    return [f"{name} at recall {', '.join(f'{r:.2f}' for r in found.recalls[better[:, k] < better[:, 0]])}"
-            for k, name in enumerate(INDICATORS) if (better[:, k] < better[:, 0]).any()]
+    where = []
+    for k, name in enumerate(INDICATORS):
+        first, last = runs(better[:, k] < better[:, 0])
+        ranges = [f"{found.recalls[a]:.2f} to {found.recalls[b]:.2f}" for a, b in zip(first, last, strict=True)]
+        if ranges:
+            where.append(f"{name} at recalls {', '.join(ranges)}")
+    return where
 
 
 def confusion_rows(found: Tally) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -59,8 +59,10 @@ def runs(on: Bools) -> tuple[Places, Places]:
 
 
 def without_chatter(h: Heard) -> Bools:
-    """Windows that truly hold no chatter."""
-    return np.isin(h.truth, (int(ChatterKind.AIR), int(ChatterKind.STABLE)))
+    """Windows that truly hold no chatter, and none before them: one that ends is no place for false alarms."""
+    chatter = np.isin(h.truth, (int(ChatterKind.HOPF), int(ChatterKind.FLIP)))
+    quiet: Bools = np.isin(h.truth, (int(ChatterKind.AIR), int(ChatterKind.STABLE)))
+    return quiet & ~np.logical_or.accumulate(chatter)
 
 
 def false_alarms(h: Heard, on: Bools) -> list[tuple[int, int]]:
