@@ -97,6 +97,15 @@ def test_calibration_gives_back_what_was_measured() -> None:
     assert calibrate(sensors, si) is si
 
 
+@pytest.mark.parametrize("end", [0.1, 0.3, 0.7, 4.7])
+def test_the_ends_of_the_range_are_saturated_whatever_their_rounding(end: float) -> None:
+    for sensor in (Sensor("a", "microphone", 1.0, end, 9.0, 5.0), Sensor("a", "microphone", 1.0, -9.0, end, -5.0)):
+        for value, flagged in ((end, True), ((sensor.lowest + sensor.highest) / 2, False)):
+            found = calibrate(Sensors((sensor,)), block(np.full((3, 1), value), ["a"]))
+            assert bool(found.channels[0].status & Status.SATURATED) is flagged
+    assert calibrate(Sensors((sensor,)), block(np.zeros((0, 1)), ["a"])).channels[0].status is Status.OK
+
+
 def test_saturation_is_flagged_in_its_block_and_told_by_the_monitor() -> None:
     sensors = operation().sensors
     t = np.arange(25600) / RATE

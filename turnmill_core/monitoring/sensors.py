@@ -41,22 +41,23 @@ def calibrate(sensors: Sensors, block: SensorBlock) -> SensorBlock:
     volts and no sensor has its name.
     """
     known = {s.name: s for s in sensors.channels}
-    if not any(c.unit == "V" for c in block.channels):
+    volts = [k for k, channel in enumerate(block.channels) if channel.unit == "V"]
+    if not volts:
         return block
-    samples, channels = block.samples.copy(), list(block.channels)
-    for k, channel in enumerate(block.channels):
-        sensor = known.get(channel.name)
-        if channel.unit != "V":
-            continue
-        if sensor is None:
-            channels[k] = replace(channel, status=channel.status | Status.UNCALIBRATED)
-            continue
-        volts = samples[:, k]
-        outside = bool(np.any((volts <= sensor.lowest) | (volts >= sensor.highest)))
+    channels, samples = list(block.channels), block.samples.copy()
+    for k in volts:
+        if channels[k].name not in known:
+            channels[k] = replace(channels[k], status=channels[k].status | Status.UNCALIBRATED)
+    columns = [k for k in volts if channels[k].name in known]
+    used = [known[channels[k].name] for k in columns]
+    seen = block.samples[:, columns]
+    ends = np.array([(s.lowest, s.highest) for s in used], dtype=np.float32).reshape(-1, 2)
+    outside = (seen.min(axis=0, initial=np.inf) <= ends[:, 0]) | (seen.max(axis=0, initial=-np.inf) >= ends[:, 1])
+    for k, sensor, beyond in zip(columns, used, outside, strict=True):
         quantity, unit = MEASURED[sensor.kind]
-        channels[k] = replace(channel, quantity=quantity, unit=unit,
-                              status=channel.status | (Status.SATURATED if outside else Status.OK))
-        samples[:, k] = (volts - sensor.offset) / sensor.sensitivity
+        channels[k] = replace(channels[k], quantity=quantity, unit=unit,
+                              status=channels[k].status | (Status.SATURATED if beyond else Status.OK))
+    samples[:, columns] = (seen - np.array([s.offset for s in used])) / np.array([s.sensitivity for s in used])
     return replace(block, channels=tuple(channels), samples=samples)
 
 
