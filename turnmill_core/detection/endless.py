@@ -21,6 +21,7 @@ from turnmill_core.detection.recordings import (
     Motion,
     Observed,
     ambient,
+    noisy_others,
     simulate_cut,
 )
 from turnmill_core.monitoring.chatter import SpindleSpeed
@@ -64,19 +65,26 @@ def go_on(motion: Motion, kind: str, number: int, part: int, seconds: float = SE
     count = round(seconds * RATE)
     wander = 1 + 1e-3 * coloured_slow(rng, count, 0.3)
     turns = np.concatenate([[0.0], np.cumsum(speed * wander)[:-1] / RATE])
-    wave = _revolution(motion, name, speed)
-    level = float(wave.std())
-    table = np.concatenate([wave, wave[:1]])
-    clean = np.interp((turns % 1.0) * TABLE, np.arange(TABLE + 1), table)
     envelope = np.zeros(count) if kind == "air" else _passes(rng, count)
-    clean *= envelope * (1 + 0.08 * coloured_slow(rng, count, 2.0))
-    noise = ambient(rng, name, count, turns, level)
+    strength = envelope * (1 + 0.08 * coloured_slow(rng, count, 2.0))
+    waves = {n: _revolution(motion, n, speed) for n in SENSED}
+    clean = {n: _along(wave, turns) * strength for n, wave in waves.items()}
+    levels = {n: float(wave.std()) for n, wave in waves.items()}
+    noise = ambient(rng, name, count, turns, levels[name])
     error = float(rng.choice([0.0, rng.uniform(-2e-3, 2e-3)]))
     at = np.arange(0, count, RATE / TACHOMETER_HZ)
     measured = speed * 2 * math.pi * np.interp(at, np.arange(count), wander) * (1 + error)
     speeds = tuple(SpindleSpeed(round(k * 1e9 / RATE), float(s)) for k, s in zip(at, measured, strict=True))
-    return Observed(CHANNELS[name], (clean + noise).astype(np.float32), turns, speeds, join_truth(()),
+    others = noisy_others(f"{kind} {number} {part}", {n: x for n, x in clean.items() if n != name}, levels,
+                          turns)
+    return Observed(CHANNELS[name], (clean[name] + noise).astype(np.float32), others, turns, speeds, join_truth(()),
                     float(noise.std()))
+
+
+def _along(wave: Floats, turns: Floats) -> Floats:
+    """A revolution (TABLE,) laid along the turns (n,)."""
+    found: Floats = np.interp((turns % 1.0) * TABLE, np.arange(TABLE + 1), np.concatenate([wave, wave[:1]]))
+    return found
 
 
 def coloured_slow(rng: np.random.Generator, count: int, corner: float) -> Floats:

@@ -9,7 +9,8 @@ a chatter that is a tenth of the displacement can be most of the sound.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,7 +92,7 @@ def _above(truth: Truth, so_far: float) -> float:
 
 @dataclass(frozen=True)
 class Observed:
-    """What a monitor gets: a channel's samples (n,) and spindle speeds; and what it does not get.
+    """What a monitor gets: the judged channel's samples (n,), the others' (n, 2) and spindle speeds; and what not.
 
     turns (n,): true revolutions of the tool at the samples; truth: of the channel without noise; noise: rms of all
     noise, in the channel's unit.
@@ -99,6 +100,7 @@ class Observed:
 
     channel: Channel
     samples: NDArray[np.float32]
+    others: NDArray[np.float32]
     turns: Floats
     speeds: tuple[SpindleSpeed, ...]
     truth: Truth
@@ -106,8 +108,10 @@ class Observed:
 
     def blocks(self, size: int = 256) -> list[SensorBlock]:
         """Blocks of `size` samples."""
-        return [SensorBlock(round(k * 1e9 / RATE), "simulated", 1, k, float(RATE), (self.channel,),
-                            self.samples[k: k + size, None]) for k in range(0, len(self.samples), size)]
+        channels = (self.channel, *(CHANNELS[name] for name in SENSED if name != self.channel.name))
+        table = np.column_stack([self.samples, self.others])
+        return [SensorBlock(round(k * 1e9 / RATE), "simulated", 1, k, float(RATE), channels, table[k: k + size])
+                for k in range(0, len(table), size)]
 
     def items(self) -> list[SensorBlock | SpindleSpeed]:
         """Blocks and spindle speeds in order of stamp."""
@@ -132,7 +136,24 @@ def observe(motion: Motion, extra_error: float = 0.0) -> Observed:
     level = float(clean[count // 2:].std())
     noise = ambient(rng, name, count, turns, level)
     truth = channel_truth(op.tool, motion.truth, clean, turns)
-    return Observed(CHANNELS[name], (clean + noise).astype(np.float32), turns, speeds, truth, float(noise.std()))
+    rest = {n: motion.samples[:, k].astype(np.float64) for k, n in enumerate(SENSED) if n != name}
+    levels = {n: float(values[count // 2:].std()) for n, values in rest.items()}
+    others = noisy_others(f"{cut.kind} {cut.number}", rest, levels, turns)
+    return Observed(CHANNELS[name], (clean + noise).astype(np.float32), others, turns, speeds, truth,
+                    float(noise.std()))
+
+
+def noisy_others(what: str, clean: Mapping[str, Floats], levels: Mapping[str, float],
+                 turns: Floats) -> NDArray[np.float32]:
+    """Channels that are not judged (n, k), each with noise of its own.
+
+    what: seeds the noise; clean: values (n,) by name; levels: rms of each in the cut; turns (n,): of the tool.
+    """
+    columns = []
+    for name, values in clean.items():
+        rng = np.random.default_rng(zlib.crc32(f"{what} {name}".encode()))
+        columns.append((values + ambient(rng, name, len(values), turns, levels[name])).astype(np.float32))
+    return np.column_stack(columns)
 
 
 def channel_truth(tool: Tool, motion: Truth, clean: Floats, turns: Floats) -> Truth:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,6 +34,15 @@ def choose(config: ChatterConfig, s: Stream, start: int, end: int) -> tuple[int,
         first = first or (k, x.astype(np.float64), reason, text)
     assert first is not None
     return first
+
+
+def others(s: Stream, start: int, end: int, judged: str) -> Iterator[tuple[str, Floats]]:
+    """Names and samples of the channels in window [start, end), other than the judged one, that can be judged too."""
+    for k, channel in enumerate(s.channels):
+        if channel.name != judged:
+            x = streams.samples(s, start, end, k)
+            if usable(x, streams.status(s, start, end, k), channel)[0] is Reason.NONE:
+                yield channel.name, x.astype(np.float64)
 
 
 def usable(x: NDArray[np.float32], status: Status, channel: Channel) -> tuple[Reason, str]:

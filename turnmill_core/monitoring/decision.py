@@ -126,15 +126,21 @@ LOUD = 1.5
 """Level over what the gate asks for, from which chatter alone shows a cut in half the time."""
 
 
-def windows_to_enter(config: ChatterConfig, f: Features, background: Background, held: Held, growing: bool) -> int:
+ENTRY = 2
+"""Further windows that chatter must last while windows reach back into the air."""
+
+
+def windows_to_enter(config: ChatterConfig, f: Features, background: Background, held: Held, growing: bool,
+                     fresh: bool = False) -> int:
     """Windows in a row that chatter must last before it begins.
 
-    One in a cut where a steady growth over several windows has led to it (growing), else enter_dwell. Longer where
+    One in a cut where a steady growth over several windows has led to it (growing), else enter_dwell; ENTRY more in
+    windows that began before the cut (fresh), where the averages still hold air. Longer where
     nothing else shows a cut, neither a plain comb now nor a cut before: machine sounds out of the cut can look like
     a family for some tenths of a second; half as long where it is far louder than the air before.
     """
     if plain_comb(f) or held.kind not in (ChatterKind.AIR, ChatterKind.UNKNOWN):
-        return 1 if growing else config.enter_dwell
+        return config.enter_dwell + ENTRY if fresh else 1 if growing else config.enter_dwell
     floor = background.energy if config.noise_floor is None else config.noise_floor**2
     loud = math.isfinite(floor) and f.energy > (LOUD * config.gate_ratio) ** 2 * floor
     return max(config.enter_dwell, config.lone_dwell // 2 if loud else config.lone_dwell)

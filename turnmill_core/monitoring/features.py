@@ -97,7 +97,7 @@ class Features:
     energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
     second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
     family that explains most of them, if any; own_half: energy of half-order lines that are not among the
-    spindle harmonics.
+    spindle harmonics; seconds: length of the window [s].
     """
 
     frequency: float
@@ -114,6 +114,7 @@ class Features:
     lines: tuple[Line, ...]
     chatter: ChatterFamily | None
     own_half: float = 0.0
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
         float(found.power[low:].sum() + energy[inside].sum()), _change(parts, np.flatnonzero(tooth & inside), noise),
         asynchronous,
         _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest), half.energy if teeth % 2 else 0.0,
+        layout.duration,
     )
 
 

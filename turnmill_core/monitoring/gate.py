@@ -23,6 +23,12 @@ def learn(config: ChatterConfig, background: Background, f: Features, whole: Spe
     return background.towards(f.energy, whole, 0.05 if quiet else 0.002)
 
 
+def loud(config: ChatterConfig, background: Background, energy: float) -> bool:
+    """True where the floor is known and the energy in the band shows more than air."""
+    floor = background.energy if config.noise_floor is None else config.noise_floor**2
+    return math.isfinite(floor) and energy > config.gate_ratio**2 * floor
+
+
 def plain_comb(f: Features) -> bool:
     """True where the tooth passing comb stands out of the noise.
 

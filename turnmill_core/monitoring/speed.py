@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from turnmill_core.monitoring.spectrum import PAD, Array, Spectrum
+from turnmill_core.monitoring.spectrum import PAD, Array, Spectrum, lines
 
 MEMORY_NS = 10_000_000_000
 """Spindle speeds older than this before the newest one are forgotten [ns]."""
@@ -45,6 +45,10 @@ def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int)
             part = (stamp_ns - earlier.stamp_ns) / (later.stamp_ns - earlier.stamp_ns)
             return earlier.speed + part * (later.speed - earlier.speed)
     return math.nan
+
+
+STEADY = 1e-5
+"""Relative change of the speed over a window below which it counts as constant."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def rotation(held: tuple[SpindleSpeed, ...], start_ns: int, end_ns: int, count: 
     if mean <= 0:
         return Rotation(np.zeros(count), mean, 0.0)
     spread = float(np.abs(values - mean).max() / mean)
-    if spread < 1e-5:
+    if spread < STEADY:
         return constant_rotation(mean, count, rate)
     slope = np.diff(speed) / np.diff(at)
     angle = np.concatenate([[0.0], np.cumsum(np.diff(at) * (speed[1:] + speed[:-1]) / 2)])
@@ -148,6 +152,30 @@ def overruled(s: Spectrum, tooth_frequency: float, ratios: Array, held: float, b
     plain = int(np.sum(seen[best, :12] > math.log(PLAIN) / 2))
     far = scores[best] > near_held + (9.0 if count > 1 else 5.0)
     return float(ratios[best]) if far and plain >= min(count, max(2, -(-min(count, 12) // 3))) else held
+
+
+def told_by_strongest(s: Spectrum, tooth_frequency: float, held: float, lowest: float, band: float) -> float:
+    """Ratio of true to measured speed: `held`, or that which makes the strongest line a tooth or half-order harmonic.
+
+    A cut has a tooth passing comb. Where there is none at the held ratio (a tenth of the line energy at most), while
+    within +-band another ratio explains four fifths of it with harmonics k / 2 of tooth_frequency [Hz], k = 1 to 6 for
+    the strongest, the speed is another. Lines above `lowest` [Hz] count; s: of a window at a constant speed.
+    """
+    found = lines(s, lowest, PLAIN, 24)
+    if not found:
+        return held
+    frequency, energy = np.array([x.frequency for x in found]), np.array([x.energy for x in found])
+
+    def explained(ratio: float) -> float:
+        order = 2 * frequency / (ratio * tooth_frequency)
+        away = np.abs(order - np.maximum(1, np.rint(order))) * ratio * tooth_frequency / 2
+        return float(energy[away < 0.3 * s.resolution].sum() / energy.sum())
+
+    if explained(held) > 0.1:
+        return held
+    tried = [2 * frequency[0] / (k * tooth_frequency) for k in range(1, 7)]
+    best = max((r for r in tried if abs(r - 1) <= band), key=explained, default=held)
+    return float(best) if explained(best) > 0.8 else held
 
 
 PLAIN = 30.0

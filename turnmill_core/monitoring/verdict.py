@@ -44,6 +44,7 @@ class Reason(IntEnum):
     KNOWN_RUNOUT = 17
     ABOVE_RUNOUT = 18
     CONTRADICTION = 19
+    DENIED = 20
 
 
 class SpeedSource(IntEnum):

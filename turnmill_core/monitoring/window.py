@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turnmill_core.monitoring import stream as streams
+from turnmill_core.monitoring.agreement import Agreement, ask, asked, with_others
 from turnmill_core.monitoring.background import Background
-from turnmill_core.monitoring.channel import choose
+from turnmill_core.monitoring.channel import choose, others
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
 from turnmill_core.monitoring.features import CALM, Features, features
-from turnmill_core.monitoring.gate import in_cut, learn, plain_comb
+from turnmill_core.monitoring.gate import in_cut, learn, loud, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
+    STEADY,
     Rotation,
     SpindleSpeed,
     best_ratio,
@@ -29,6 +32,7 @@ from turnmill_core.monitoring.speed import (
     ratio_grid,
     rotation,
     speed_at,
+    told_by_strongest,
 )
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.tip import ShankRunout, learned, probes_in, tip_in
@@ -56,7 +60,7 @@ class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
     ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
     ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far, runout: of
-    the shank, as fibre probes see it."""
+    the shank, as fibre probes see it; entered_ns: end of the window with which the cut began."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
@@ -66,6 +70,7 @@ class Tracker:
     middle: float = 1.0
     calm: int = 0
     runout: ShankRunout = field(default_factory=ShankRunout)
+    entered_ns: int = -1
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -112,7 +117,7 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
         return _unknown(tracker, blank, Reason.SPEED_CHANGING,
                         f"the spindle speed differs by up to {100 * turned.spread:.0f} % from its mean")
     tracker, verdict = _judge_samples(config, tracker, replace(blank, spindle_speed_source=source), x, s.sample_rate,
-                                      turned, prior)
+                                      turned, prior, others(s, start, end, name))
     if seen is not None and verdict.state is ChatterKind.AIR and verdict.reason is not Reason.PERSISTENCE:
         runout = learned(tracker.runout, seen)
         new = runout.known and not tracker.runout.known
@@ -125,9 +130,9 @@ def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tup
 
 
 def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
-                   prior: Prior | None) -> tuple[Tracker, Verdict]:
+                   prior: Prior | None, others: Iterable[tuple[str, Array]]) -> tuple[Tracker, Verdict]:
     p = prepare(x, rate, config.band[1])
-    steady = turned.spread < 1e-5
+    steady = turned.spread < STEADY
     turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
         turned.turns, len(p.samples), p.rate / rate)
     grid_index = (blank.last_sample + 1) // max(1, round(config.hop * rate))
@@ -143,8 +148,10 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
         middle = tracker.middle
         if steady and look:
             tooth_frequency = config.principal_teeth * turned.mean / (2 * math.pi)
-            middle = overruled(spectrum(p.samples, p.rate, p.top), tooth_frequency, ratio_grid(config.nominal_band),
-                               middle, config.axis_band)
+            whole = spectrum(p.samples, p.rate, p.top)
+            middle = overruled(whole, tooth_frequency, ratio_grid(config.nominal_band), middle, config.axis_band)
+            if loud(config, tracker.background, float(whole.power.sum())):
+                middle = told_by_strongest(whole, tooth_frequency, middle, config.band[0], config.nominal_band)
     told = min(config.nominal_band, PULL / (config.principal_teeth * float(turns[-1] - turns[0])))
     wide = (middle - told, middle + told) if look and told > config.axis_band else None
     band = (middle - config.axis_band, middle + config.axis_band)
@@ -157,8 +164,15 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
     entering = tracker.held.kind in (ChatterKind.AIR, ChatterKind.UNKNOWN) and _doubles(p.samples)
     judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering)
-    enter = windows_to_enter(config, f, tracker.background, tracker.held, risen > 1)
+    heard = Agreement()
+    if not chattering and asked(config, judgement):
+        heard = ask(f, others, rate, turned, config.principal_teeth, config.band)
+        judgement = with_others(judgement, heard)
+    fresh = judgement.kind is ChatterKind.HOPF and (
+        tracker.held.kind is ChatterKind.AIR or blank.window_start_ns < tracker.entered_ns)
+    enter = windows_to_enter(config, f, tracker.background, tracker.held, risen > 1 or bool(heard.confirm), fresh)
     held = persist(config, tracker.held, judgement.kind, enter)
+    entered = blank.window_end_ns if tracker.held.kind is ChatterKind.AIR is not held.kind else tracker.entered_ns
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
         background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
@@ -169,7 +183,8 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     calm = tracker.calm
     if plain_comb(f) and abs(math.log(f.change)) < 0.3 and sum(x.energy for x in f.lines) < CALM * f.synchronous:
         middle, calm = f.speed_ratio, min(SURE, calm + 1)
-    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm, tracker.runout), verdict
+    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm, tracker.runout,
+                   entered), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
