@@ -8,7 +8,7 @@ import pytest
 
 from tests.monitoring.signals import blocks, by_stamp, comb, flip, noise, phase, speeds, watch
 from turnmill_core.monitoring.config import ChatterConfig
-from turnmill_core.monitoring.half_order import ABOVE, WITHIN, half_order
+from turnmill_core.monitoring.half_order import ABOVE, GROWN, WITHIN, half_order
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 from turnmill_core.prediction import PredictedType, Prior
 
@@ -26,7 +26,7 @@ def config(times: float, half: float = 0.5, teeth: int = 2) -> ChatterConfig:
     return ChatterConfig(teeth=teeth, nominal_speed=SPEED, runout_share=of_odds(half / (1 - half) / times))
 
 
-@pytest.mark.parametrize("half", [0.05, 0.5, 0.98])
+@pytest.mark.parametrize("half", [0.05, 0.2, 0.49])
 @pytest.mark.parametrize(("times", "prior", "state", "reason"), [
     (0.5, None, ChatterKind.STABLE, Reason.KNOWN_RUNOUT),
     (0.9 * WITHIN, None, ChatterKind.STABLE, Reason.KNOWN_RUNOUT),
@@ -46,6 +46,13 @@ def test_known_runout_and_prediction_decide_where_they_do_not_contradict(
     found = half_order(config(times, half), half, prior)
     assert found[:2] == (state, reason)
     assert f"{100 * half:.0f} %" in found[2]
+
+
+def test_lines_that_hold_most_of_the_energy_are_not_taken_for_runout() -> None:
+    half = 1.1 * GROWN
+    assert half_order(config(0.5, half), half, None)[:2] == (EITHER, Reason.NO_PRIOR)
+    assert half_order(config(0.5, half), half, STABLE)[:2] == (ChatterKind.STABLE, Reason.PRIOR_RUNOUT)
+    assert half_order(config(1.1 * ABOVE, half), half, None)[:2] == (ChatterKind.FLIP, Reason.ABOVE_RUNOUT)
 
 
 @pytest.mark.parametrize("half", [0.05, 0.9999, 1.0])

@@ -30,8 +30,8 @@ def measured(cut: Cut) -> Operation:
 def decided_by_runout(kind: str, number: int) -> tuple[int, int, int]:
     """Windows of a cut that a known runout decides rightly, of those that it leaves undecided, and of all asked.
 
-    kind: "flip_even", with the teeth run out as much as those of the kind "runout": all windows that truly flip;
-    or "runout": those that are FLIP_OR_RUNOUT to a monitor that knows nothing.
+    kind: "runout", or "flip_even" with the teeth run out as much. Asked are the windows of stable cuts, or that truly
+    flip, which are FLIP_OR_RUNOUT to a monitor that knows nothing.
     """
     cut = make_cut(kind, number)
     cut = cut if kind == "runout" else much_runout(cut)
@@ -40,10 +40,8 @@ def decided_by_runout(kind: str, number: int) -> tuple[int, int, int]:
     verdicts = listen(replace(config, runout_share=half_order_share(op, op.conditions)), seen)
     states = np.array([v.state for v in verdicts])
     truth = np.array([-1 if k is None else int(k) for k in true_kinds(cut, seen, verdicts)])
-    if kind == "runout":
-        alike = np.array([v.state for v in listen(config, seen)]) == ChatterKind.FLIP_OR_RUNOUT
-        asked, right = (truth == ChatterKind.STABLE) & alike, ChatterKind.STABLE
-    else:
-        asked, right = truth == ChatterKind.FLIP, ChatterKind.FLIP
+    alike = np.array([v.state for v in listen(config, seen)]) == ChatterKind.FLIP_OR_RUNOUT
+    right = ChatterKind.STABLE if kind == "runout" else ChatterKind.FLIP
+    asked = (truth == right) & alike
     return (int(np.sum(states[asked] == right)), int(np.sum(states[asked] == ChatterKind.FLIP_OR_RUNOUT)),
             int(asked.sum()))
