@@ -63,7 +63,8 @@ def test_channels_that_could_not_hear_it_say_nothing(other: np.ndarray) -> None:
 
 def test_period_two_is_confirmed_by_half_order_lines() -> None:
     turns = phase(SPEED, SECONDS)
-    both = [comb(turns, 3) + size * flip(turns, 3, 1.0) + noise(len(turns), 0.02, k) for k, size in ((1, 0.6), (2, 0.3))]
+    both = [comb(turns, 3) + size * flip(turns, 3, 1.0) + noise(len(turns), 0.02, k)
+            for k, size in ((1, 0.6), (2, 0.3))]
     assert heard(*both, teeth=3)[-1].state is ChatterKind.FLIP
     denied = heard(both[0], comb(turns, 3) + noise(len(turns), 0.02, 3), teeth=3)[-1]
     assert (denied.state, denied.reason) == (ChatterKind.MARGINAL, Reason.DENIED)
