@@ -38,13 +38,13 @@ class Rival:
     source: str
 
 
-FITTED = "finds 90 % of the training cuts with chatter"
+FITTED = "finds 95 % of training chatters"
 
 RIVALS = (
-    Rival("FFT energy ratio", 0.4, FITTED),
-    Rival("once-per-revolution variance", 0.9, FITTED),
+    Rival("FFT energy ratio", 0.125, FITTED),
+    Rival("once-per-revolution variance", 0.649, FITTED),
     Rival("Kalman comb, Teager-Kaiser", 0.2, "published"),
-    Rival("maximum entropy, sequential", 1.0, "Wald's bound"),
+    Rival("maximum entropy, sequential", 0.206, FITTED),
 )
 
 HOP = 0.05
@@ -59,8 +59,8 @@ WRONG = 0.01
 RANGE = (-6.0, 0.0)
 """Range of the densities [decades of energy share]."""
 
-STABLE = Density(*RANGE, (-22.55, -37.2, -24.47, -11.62, -3.99))
-CHATTER = Density(*RANGE, (-37.72, 60.13, -42.99, 19.6, -9.33))
+STABLE = Density(*RANGE, (-5.08, -5.75, -1.93, -0.06, -0.71))
+CHATTER = Density(*RANGE, (-63.09, 104.03, -71.12, 31.66, -12.18))
 
 GATE = 2.0
 LEARNED, LEARNED_LOUD = 0.05, 0.002
