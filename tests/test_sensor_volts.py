@@ -19,6 +19,7 @@ from turnmill_core.operation_sensors import Sensors
 from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.simulation import simulate
 from turnmill_ros.analysis import Analysis, analyze, timeline
+from turnmill_ros.bag import check_bag
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from turnmill_ros.report import recording_report, tip_reader
 from turnmill_ros.signals import sensor_blocks
@@ -58,6 +59,7 @@ def test_recording_holds_volts_of_every_sensor(volts) -> None:
     block = next(sensor_blocks(volts, replace(OP.sensors, channels=())))
     assert [c.name for c in block.channels] == [s.name for s in OP.sensors.channels]
     assert {c.unit for c in block.channels} == {"V"}
+    assert check_bag(volts) == []
     probes = [k for k, s in enumerate(OP.sensors.channels) if s.kind == "fibre probe"]
     assert np.all((block.samples[:, probes] > 2.3) & (block.samples[:, probes] < 2.7))
 
@@ -122,6 +124,9 @@ def test_saturation_is_flagged_in_its_block_and_stops_the_verdict_on_the_tip(vol
     assert told[0].state is ChatterKind.UNKNOWN
     assert first <= told[0].window_end_ns <= first + 20_000_000 + 50_000_000
     assert all(v.reason is Reason.SATURATED for v in analysis.verdicts if v.window_end_ns > told[0].window_end_ns)
+    found = [f for f in check_bag(path) if "low_x" in f.text]
+    assert [f.code for f in found] == ["saturated"]
+    assert found[0].time_s == pytest.approx((first - START_NS) * 1e-9, abs=1e-6)
     reader = tip_reader(analysis)
     assert reader is not None
     spoilt, fine = (reader.orbit(START_NS + round(t * 1e9), START_NS + round((t + 0.5) * 1e9)) for t in (4.3, 2.5))

@@ -11,8 +11,9 @@ import numpy as np
 
 from turnmill_core.machine.axes import AxisState
 from turnmill_core.monitoring.blocks import SensorBlock, Status
-from turnmill_core.monitoring.sensors import PLAUSIBLE
+from turnmill_core.monitoring.sensors import PLAUSIBLE, calibrate
 from turnmill_core.operation import Operation
+from turnmill_core.operation_sensors import NO_SENSORS
 from turnmill_ros import topics as table
 from turnmill_ros.bag_read import BagInfo, TopicInfo, bag_info, read_bag
 from turnmill_ros.conversions import axes_from_message, block_from_message, operation_from_message
@@ -126,13 +127,14 @@ def _check_messages(path: str | Path, readable: set[str], findings: _Findings) -
     streams: dict[tuple[str, str], SensorBlock] = {}
     axes: dict[str, AxisState] = {}
     operations: dict[str, Operation] = {}
+    sensors = NO_SENSORS
     spans: dict[str, tuple[int, int]] = {}
     for topic, _, message in read_bag(path, readable) if readable else ():
         kind = message.__msgtype__
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         try:
             if kind == table.SENSOR_BLOCKS.type:
-                block = block_from_message(message)
+                block = calibrate(sensors, block_from_message(message))
                 _check_block(topic, block, streams.get((topic, block.device)), findings)
                 streams[topic, block.device] = block
                 _widen(spans, "blocks", stamp, _end_ns(block))
@@ -143,6 +145,7 @@ def _check_messages(path: str | Path, readable: set[str], findings: _Findings) -
                 _widen(spans, "axes", stamp, stamp)
             elif kind == table.OPERATION.type:
                 operations[message.sha256] = operation_from_message(message)
+                sensors = operations[message.sha256].sensors
         except ValueError as error:
             findings.add("error", "bad_message", topic, str(error), stamp)
     _check_whole(streams, operations, spans, findings)
@@ -172,9 +175,10 @@ def _check_block(topic: str, block: SensorBlock, last: SensorBlock | None, findi
         if peak > PLAUSIBLE.get(channel.unit, np.inf):
             say("warning", "implausible", f"{where}: {peak:g} {channel.unit} is beyond {PLAUSIBLE[channel.unit]:g}; "
                                           "is the unit right?")
-        for flag in (Status.SATURATED, Status.DEAD):
-            if channel.status & flag:
-                say("warning", flag.name.lower() if flag.name else "status", f"{where}: reported by the device")
+        if channel.status & Status.SATURATED:
+            say("warning", "saturated", f"{where}: at the ends of its range")
+        if channel.status & Status.DEAD:
+            say("warning", "dead", f"{where}: reported by the device")
     if last is None:
         return
     if (block.stream_id, block.sample_rate, [c.name for c in block.channels]) != (
