@@ -152,7 +152,7 @@ def detection_report(output: Path, plan: Plan, found: Tally) -> None:
 
 def false_alarm_curves(found: Tally) -> figure:
     """False alarms per hour over recall, one curve per indicator, and the operating point on or beside each."""
-    plot = figures.new_figure("False alarms at each recall, thresholds on the score; dots: operating points",
+    plot = figures.new_figure("False alarms at each recall, by threshold; symbols: operating points",
                               "share of chatters found in time [1]", "false alarms per hour [1/h]", 420,
                               y_axis_type="log", x_range=(0, 1.02))
     none = 0.5 / max(found.hours, 1e-3)
@@ -192,11 +192,13 @@ def confusion_picture(found: Tally) -> figure:
 
 def delays_picture(found: Tally) -> figure:
     """Alarm of every depth ramp after the 20 % crossing beside the time in which the amplitude triples."""
-    plot = figures.new_figure("Alarms on depth ramps", "time from the crossing of 20 % to tripled amplitude [s]",
+    plot = figures.new_figure(f"Alarms on depth ramps (earlier than {LATE:g} s before the crossing: at the lower edge)",
+                              "time from the crossing of 20 % to tripled amplitude [s]",
                               "alarm after the crossing [s]", 300)
     tripled, delays = np.array(found.tripled), np.array(found.delays)
     at = np.isfinite(tripled) & np.isfinite(delays)
-    plot.scatter(tripled[at], delays[at], size=8, color=figures.LINE_COLOURS[0], legend_label="alarm")
+    plot.scatter(tripled[at], np.maximum(delays[at], -LATE), size=8, color=figures.LINE_COLOURS[0],
+                 legend_label="alarm")
     ends = [0.0, float(tripled[at].max(initial=0.3))]
     plot.line(ends, ends, color="#444444", line_dash="dashed", legend_label="tripled")
     plot.line(ends, [LATE, LATE], color="#444444", line_dash="dotted", legend_label=f"{LATE:g} s")
