@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import socket
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from tests.browser import look
 from turnmill_core.monitoring.blocks import Channel, SensorBlock
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
+from turnmill_core.operation_sensors import Sensor, Sensors
 from turnmill_ros.dashboard import SHOWN_S, SPECTRUM_S, LiveData, live_figures, serve
 
 SECOND = 1_000_000_000
@@ -69,6 +71,21 @@ def test_the_page_holds_the_reports_figures_and_the_headline() -> None:
     frequency, amplitude = (np.asarray(shown[-1].renderers[0].data_source.data[k]) for k in ("f", "a"))
     assert frequency[np.argmax(amplitude)] == pytest.approx(778.0, abs=2.0)
     assert live_figures(LiveData())[1] == []
+
+
+def test_volts_are_shown_calibrated_and_the_tip_by_its_first_probe() -> None:
+    data = filled()
+    probe = Sensor("low_x", "fibre probe", 5800.0, -1.0, 1.0)
+    data.sensors = Sensors((Sensor("mic", "microphone", 0.05, -5.0, 5.0), probe))
+    data.blocks.clear()
+    for k in range(60):
+        volts = replace(block(k), channels=(Channel("low_x", "voltage", "V"),))
+        data.block(volts)
+    data.verdict(replace(verdict(11.0), channel="tip_x"))
+    _, shown = live_figures(data)
+    assert shown[-1].title.text == "low_x, last 0.5 s"
+    assert shown[-1].yaxis.axis_label == "amplitude [m]"
+    assert max(shown[-1].renderers[0].data_source.data["a"]) == pytest.approx(1 / 5800, rel=0.2)
 
 
 def test_a_browser_shows_the_page_and_keeps_up(tmp_path: Path) -> None:

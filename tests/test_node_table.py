@@ -35,6 +35,12 @@ def test_counterparts_of_a_live_run() -> None:
     assert found["operation_server"] == set()
 
 
+def test_channels_of_a_live_run() -> None:
+    for channels, volts, count in ((None, True, 5), (3, False, 3)):
+        spec = next(s for s in live_specs("text", None, channels=channels) if s.name == "process_simulator")
+        assert (spec.parameters["volts"], len(spec.parameters["channels"])) == (volts, count)
+
+
 def test_counterparts_of_a_replay() -> None:
     found = matches(replay_specs("in.mcap", None, rate=0.0, operation_text=None, prior="recorded", axes="recorded"))
     assert found["player"] == {

@@ -20,6 +20,7 @@ from turnmill_core.process.config import SimulationConfig
 from turnmill_core.process.simulation import simulate
 from turnmill_ros.analysis import Analysis, analyze, timeline
 from turnmill_ros.bag import check_bag
+from turnmill_ros.force_compare import compare
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from turnmill_ros.report import recording_report, tip_reader
 from turnmill_ros.signals import sensor_blocks
@@ -96,6 +97,13 @@ def test_tip_orbit_is_within_five_percent_of_the_truth(heard) -> None:
         assert error < 0.05 * np.sqrt(np.sum(expected.var(axis=0)))
         assert len(orbit.once()) == pytest.approx((end - start) * 3025 / 60, abs=1)
         assert orbit.turns[0] == pytest.approx((orbit.x.start_ns - START_NS) * 1e-9 * 3025 / 60, abs=1e-6)
+
+
+def test_forces_in_volts_are_compared_with_the_model(volts) -> None:
+    (source, windows), = compare(volts).windows.items()
+    assert source.components == (0, 1)
+    stable = [w for w in windows if w.reason == ""][:4]
+    assert stable[-1].scale == pytest.approx(1.0, abs=0.01)
 
 
 def narrow() -> Operation:

@@ -310,15 +310,17 @@ def test_the_chatter_monitor_counts_gaps_and_judges_up_to_the_end(probe: Probe) 
     assert {m.operation_hash for m in heard} == {op.sha256}
 
 
-def test_the_process_simulator_makes_the_blocks_of_the_core_and_says_when_it_is_late(probe: Probe) -> None:
+@pytest.mark.parametrize(("name", "volts"), [("thesis_table_4_9", False), ("demo_sensors", True)])
+def test_the_process_simulator_makes_the_blocks_of_the_core_and_says_when_it_is_late(
+        probe: Probe, name: str, volts: bool) -> None:
     from turnmill_core.process.simulation import SimulationConfig, simulate
 
-    op = operation()
+    op = operation(name)
     publish_operation(probe, op)
     probe.listen(topics.SENSOR_BLOCKS)
     probe.announce(topics.JOINT_STATES)
-    simulator = probe.add(ProcessSimulator, sample_rate=6400, channels=["sound", "tool_x"], seed=3,
-                          match=["joint_states=1", "sensor_blocks=1"])
+    simulator = probe.add(ProcessSimulator, sample_rate=6400, channels=["sound", "tool_x"], volts=volts,
+                          seed=3, match=["joint_states=1", "sensor_blocks=1"])
     assert support.start(simulator)
     start = probe.get_clock().now().nanoseconds - 5_000_000_000
     states = [axis_state_at(op, k * 0.004, start + k * 4_000_000) for k in range(60)]
@@ -326,11 +328,12 @@ def test_the_process_simulator_makes_the_blocks_of_the_core_and_says_when_it_is_
         probe.publish(topics.JOINT_STATES, axes_to_message(state, ros_types()))
     heard = probe.heard["sensor_blocks"]
     assert probe.until(lambda: len(heard) >= 8)
-    config = SimulationConfig(sample_rate=6400, start_ns=start)
+    config = SimulationConfig(sample_rate=6400, start_ns=start, volts=volts)
     expected = [b for chunk in simulate(op, config, 3, duration=0.16) for b in chunk.blocks]
     for one, message in zip(expected, heard, strict=False):
         found = block_from_message(message)
         assert (found.stamp_ns, found.first_sample) == (one.stamp_ns, one.first_sample)
+        assert {c.unit for c in found.channels} == ({"V"} if volts else {"Pa", "m"})
         np.testing.assert_array_equal(found.samples, one.samples)
     assert probe.until(lambda: any(s.level == DiagnosticStatus.WARN and "behind" in s.message
                                    for s in probe.statuses("process_simulator")))
