@@ -42,7 +42,7 @@ def summary_rows(found: Tally) -> list[tuple[str, str, str]]:
         ("flip or runout, even teeth, prior of a wrong model", _share(found.half_order_prior), "at least 90 %"),
         ("flip, even teeth, without a prior: FLIP_OR_RUNOUT", _share(found.half_order), "at least 90 %"),
         ("flip or runout, even teeth, runout known to 20 %", _of_three(found.half_order_runout), ""),
-        ("alarm on depth ramps after 20 %, median", f"{_median(found.delays):.3f} s" if len(delays) else "none asked",
+        ("alarm on depth ramps after 20 %, median", _seconds(_median(delays)) if len(delays) else "none asked",
          f"at most {LATE:g} s"),
         ("alarm on depth ramps before tripled", _share((found.standings[0].before_tripled, len(delays))), "all"),
         ("verdicts that a tachometer 1 % wrong changes", _share(found.changed), "at most 1 %"),
@@ -63,8 +63,12 @@ def _comparison_column(found: Tally, s: Standing) -> tuple[str, ...]:
     threshold = s.source if math.isnan(s.threshold) else f"{s.threshold:.3g}, {s.source}"
     return (threshold, f"{s.false_alarms}", f"{s.false_alarms / found.hours:.1f}" if found.hours else "",
             f"{s.ungated}", f"{100 * s.false_share:.2g} %", _share(s.hopf), _share(s.flip_odd), f"{s.area:.4f}",
-            f"{_median(s.delays):.3f} s" if s.delays else "none asked",
+            _seconds(_median(s.delays)) if s.delays else "none asked",
             _share((s.before_tripled, len(s.delays))), f"{s.cpu:.4f} s")
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.3f} s" if math.isfinite(value) else "none in time"
 
 
 def _median(delays: Sequence[float]) -> float:
