@@ -245,9 +245,17 @@ def test_the_whole_corpus(whole: Tally) -> None:
     assert whole.half_order[0] >= 0.9 * whole.half_order[1] > 0
     right, undecided, count = whole.half_order_runout
     assert right > 0.8 * count
-    assert count - right - undecided < 0.05 * count
+    assert count - right - undecided < 0.08 * count
     assert float(np.nanmedian(whole.delays)) < 0.3
-    assert all(whole.standings[0].false_alarms < s.false_alarms for s in whole.standings[1:])
+
+
+@pytest.mark.slow
+def test_no_published_indicator_has_as_few_false_alarms(whole: Tally) -> None:
+    """Fewer in total, each at its operating point, and no more at any recall."""
+    ours, *others = whole.standings
+    assert all(ours.false_alarms < s.false_alarms for s in others)
+    false_at = np.nan_to_num(whole.false_at, nan=np.inf)
+    assert (false_at[:, 1:] >= false_at[:, :1]).all()
 
 
 @pytest.mark.slow
