@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import random
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -211,6 +213,34 @@ def test_settings_are_checked() -> None:
         FeedSettings(prior="guess")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="hop"):
         FeedSettings(changes={"hop": -1.0}).config(operation())
+
+
+def test_after_warming_nothing_is_compiled_while_the_machine_chatters() -> None:
+    """In a process of its own: a loop that is compiled during a cut costs seconds."""
+    code = """
+import numpy as np
+from dataclasses import replace
+from turnmill_core.monitoring import _kernels
+from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
+from tests.test_monitor_join import RATE, ROWS, axes, blocks, operation
+
+def compiled():
+    return {name: len(k.signatures) for name, k in vars(_kernels).items() if hasattr(k, "signatures")}
+
+op = operation()
+MonitorFeed(FeedSettings()).warm(op)
+before, feed, said = compiled(), MonitorFeed(FeedSettings(prior="none")), []
+feed.operation(0, op)
+for k, block in enumerate(blocks(op, 1.0)):
+    t = (k * ROWS + np.arange(ROWS)) / RATE
+    tone = np.cos(2 * np.pi * 787 * t) * (1 + 0.3 * np.cos(op.tooth_passing_frequency * 2 * np.pi * t))
+    said += feed.block(replace(block, samples=block.samples + tone[:, None].astype(np.float32)))
+for a in axes(op, 1.0):
+    said += feed.axes(a)
+print(said[-1][0].state.name, compiled() == before)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["HOPF", "True"]
 
 
 def test_warming_leaves_no_trace(live: list[Verdict]) -> None:

@@ -149,13 +149,18 @@ class MonitorFeed:
         return new
 
     def warm(self, operation: Operation) -> None:
-        """Compile everything that a verdict on `operation` needs, on noise."""
+        """Compile everything that a verdict on `operation` needs, on a cut with chatter."""
         trial = MonitorFeed(FeedSettings(prior="none", axes="none"))
         trial.operation(0, operation)
-        noise = np.random.default_rng(0).standard_normal((30, 256, 1)).astype(np.float32)
+        time = np.arange(7680) / 12800.0
+        tooth = operation.tool.teeth * operation.conditions.tool_speed * time
+        cut = sum(np.cos(n * tooth) / n for n in range(1, 8))
+        chatter = np.cos(2 * np.pi * 871.3 * time) * (1 + 0.4 * np.cos(tooth))
+        noise = 0.1 * np.random.default_rng(0).standard_normal(len(time))
+        samples = (cut + chatter + noise).astype(np.float32).reshape(30, 256, 1)
         channel = Channel("warm", "sound_pressure", "Pa")
-        for k, samples in enumerate(noise):
-            trial.block(SensorBlock(k * 20_000_000, "warm", 1, k * 256, 12800.0, (channel,), samples))
+        for k, part in enumerate(samples):
+            trial.block(SensorBlock(k * 20_000_000, "warm", 1, k * 256, 12800.0, (channel,), part))
         trial.finish()
 
     def _pump(self, ending: bool = False) -> Judged:

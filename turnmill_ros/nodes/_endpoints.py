@@ -101,11 +101,10 @@ def take_pending(subscribed: Subscription, callback: Callable[[Any], None], most
     return taken
 
 
-def drain(node: Node) -> None:
-    """Handle every message that has arrived at `node`'s own subscriptions."""
-    for subscribed in node.subscriptions:
-        if hasattr(subscribed, "handle_one"):
-            take_pending(subscribed, subscribed.handle_one)
+def drain(node: Node) -> int:
+    """Handle every message that has arrived at `node`'s own subscriptions; returns how many."""
+    return sum(take_pending(subscribed, subscribed.handle_one) for subscribed in node.subscriptions
+               if hasattr(subscribed, "handle_one"))
 
 
 def wait_until_acknowledged(node: Node, deadline_s: float = 1.0, until: threading.Event | None = None) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -48,8 +49,12 @@ PARENT_VARIABLE = "TURNMILL_PARENT"
 """Environment variable with the process id of the graph; a node ends when that process is gone."""
 
 GATHER_S = 0.008
-"""Pause between wakes of a process: what arrives meanwhile is handled at once, at half the cost at 250 Hz. A node whose
-answers may come later says so with an attribute `gather_s` [s]."""
+"""Pause of a process after it has handled what arrived: what comes meanwhile is handled at once, at half the cost at
+250 Hz. A node whose answers may come later, or must come sooner, says so with an attribute `gather_s` [s]."""
+
+BUSY_S = 0.05
+"""While messages keep coming, the executor, which costs more than all of them, is asked for timers and services this
+often only [s]."""
 
 Transition = Callable[[Any, LifecycleState], TransitionCallbackReturn]
 
@@ -145,12 +150,19 @@ def main(create: Callable[[], Any]) -> None:
     try:
         if isinstance(node, LifecycleNode) and node.get_parameter("autostart").value:
             start(node)
+        gather_s = getattr(node, "gather_s", GATHER_S)
+        heard = spun = -math.inf
         while not ending.is_set() and not node.diagnostics.failure and parent in (None, str(os.getppid())):
-            try:
-                executor.spin_once(timeout_sec=0.1)
-            except RCLError as error:  # somebody asked for a transition that this state does not have
-                node.get_logger().warning(str(error))
-            ending.wait(getattr(node, "gather_s", GATHER_S))
+            now = time.monotonic()
+            if drain(node):
+                heard = now
+            if now - heard > BUSY_S or now - spun > BUSY_S:
+                try:
+                    executor.spin_once(timeout_sec=0.1 if now - heard > BUSY_S else 0.0)
+                except RCLError as error:  # somebody asked for a transition that this state does not have
+                    node.get_logger().warning(str(error))
+                spun = time.monotonic()
+            ending.wait(gather_s)
         stop(node)
     finally:
         failure = node.diagnostics.failure

@@ -19,7 +19,7 @@ from turnmill_ros.conversions import (
     verdict_to_message,
 )
 from turnmill_ros.interfaces import ros_types
-from turnmill_ros.monitor_join import FeedSettings, MonitorFeed, end_ns
+from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from turnmill_ros.node_table import VERDICT_PLOTS
 from turnmill_ros.nodes import _support as support
 from turnmill_ros.parameters import Setting, declare, declare_config
@@ -58,6 +58,8 @@ class ChatterMonitor(LifecycleNode):
     uses as well.
     """
 
+    gather_s = 0.002  # a verdict is due within milliseconds of the block that completes its window
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("chatter_monitor", **kwargs)
         changes = declare_config(self, ChatterConfig(teeth=1), SETTINGS)
@@ -71,6 +73,7 @@ class ChatterMonitor(LifecycleNode):
         self._match, lossless = support.declare_common(self)
         self._feed = MonitorFeed(self._settings)
         self._sent, self._lag = 0, 0.0
+        self._lags: list[float] = []
         self._out = {t: support.publisher(self, t, keep_all=lossless) for t in (
             topics.CHATTER_STATE, *VERDICT_PLOTS)}
         self.diagnostics = support.Diagnostics(self, self._values, self._warning, paced=lossless)
@@ -116,9 +119,7 @@ class ChatterMonitor(LifecycleNode):
 
     def on_block(self, message: Any) -> None:
         """Take a block of samples."""
-        block = block_from_message(message)
-        self._publish(self._feed.block(block))
-        self._lag = (self.get_clock().now().nanoseconds - end_ns(block)) * 1e-9
+        self._publish(self._feed.block(block_from_message(message)))
 
     def on_margin(self, message: Any) -> None:
         """Take a prediction."""
@@ -132,6 +133,7 @@ class ChatterMonitor(LifecycleNode):
         types = ros_types()
         for verdict, operation_hash in verdicts:
             support.send(self._out[topics.CHATTER_STATE], verdict_to_message(verdict, operation_hash, types))
+            self._lags.append((self.get_clock().now().nanoseconds - verdict.window_end_ns) * 1e-9)
             for topic in VERDICT_PLOTS:
                 value = getattr(verdict, topic.name.removeprefix("plot/"))
                 support.send(self._out[topic], scalar_to_message(value, types))
@@ -141,6 +143,8 @@ class ChatterMonitor(LifecycleNode):
         return self._feed.counts.trouble()
 
     def _values(self) -> dict[str, object]:
+        if self._lags:
+            self._lag, self._lags = max(self._lags), []
         counts = {f"received_{name}": count for name, count in self._feed.counts.values().items()}
         return {**counts, "blocks_judged": self._feed.judged, "blocks_dropped": self._feed.dropped,
                 "verdicts_sent": self._sent, "lag_s": f"{self._lag:.3f}"}

@@ -35,6 +35,8 @@ SETTINGS = {
 class ProcessSimulator(LifecycleNode):
     """Integrates the cut as soon as axis states cover a block; says so when it falls behind them."""
 
+    gather_s = 0.002  # the block waits for one axis state
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("process_simulator", **kwargs)
         default = SimulationConfig(sample_rate=51200, truth=False)
