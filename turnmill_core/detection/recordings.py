@@ -29,6 +29,7 @@ from turnmill_core.process.simulation import SimulationConfig, simulate
 from turnmill_core.process.truth import (
     CROSSING,
     MARKS_PER_TURN,
+    PERIODS,
     Truth,
     crossings,
     join_truth,
@@ -46,6 +47,8 @@ makes audible."""
 TACHOMETER_HZ = 250.0
 TRUTH_HOP = 0.03
 TOP = 5000.0
+LASTING = 0.2
+"""Length of the windows of the lasting truth [s]."""
 SURE, NOT = 0.25, 0.12
 """Asynchronous (or half-order) over synchronous amplitude from which a window is chatter, and below which it is not;
 the threshold of 0.2 lies between."""
@@ -94,8 +97,8 @@ def _above(truth: Truth, so_far: float) -> float:
 class Observed:
     """What a monitor gets: the judged channel's samples (n,), the others' (n, 2) and spindle speeds; and what not.
 
-    turns (n,): true revolutions of the tool at the samples; truth: of the channel without noise; noise: rms of all
-    noise, in the channel's unit.
+    turns (n,): true revolutions of the tool at the samples; truth: of the channel without noise; lasting: the same over
+    longer windows, in which lines close to a spindle harmonic show too; noise: rms of all noise, in the channel's unit.
     """
 
     channel: Channel
@@ -104,6 +107,7 @@ class Observed:
     turns: Floats
     speeds: tuple[SpindleSpeed, ...]
     truth: Truth
+    lasting: Truth
     noise: float
 
     def blocks(self, size: int = 256) -> list[SensorBlock]:
@@ -139,7 +143,9 @@ def observe(motion: Motion, extra_error: float = 0.0) -> Observed:
     rest = {n: motion.samples[:, k].astype(np.float64) for k, n in enumerate(SENSED) if n != name}
     levels = {n: float(values[count // 2:].std()) for n, values in rest.items()}
     others = noisy_others(f"{cut.kind} {cut.number}", rest, levels, turns)
-    return Observed(CHANNELS[name], (clean + noise).astype(np.float32), others, turns, speeds, truth,
+    per_second = op.conditions.tool_speed / (2 * math.pi * principal_turns(op.tool))
+    lasting = channel_truth(op.tool, motion.truth, clean, turns, max(PERIODS, round(LASTING * per_second)))
+    return Observed(CHANNELS[name], (clean + noise).astype(np.float32), others, turns, speeds, truth, lasting,
                     float(noise.std()))
 
 
@@ -156,8 +162,8 @@ def noisy_others(what: str, clean: Mapping[str, Floats], levels: Mapping[str, fl
     return np.column_stack(columns)
 
 
-def channel_truth(tool: Tool, motion: Truth, clean: Floats, turns: Floats) -> Truth:
-    """Truth of a channel without noise.
+def channel_truth(tool: Tool, motion: Truth, clean: Floats, turns: Floats, periods: int = PERIODS) -> Truth:
+    """Truth of a channel without noise, over windows of so many principal `periods`.
 
     clean (n,) at RATE, turns (n,): revolutions of the tool; contact is that of the motion. Up to the highest
     frequency that the monitor listens to.
@@ -169,7 +175,7 @@ def channel_truth(tool: Tool, motion: Truth, clean: Floats, turns: Floats) -> Tr
     period = principal_turns(tool)
     hop = max(1, round(TRUTH_HOP * (turns[-1] - turns[0]) * RATE / len(turns) / period))
     rows = np.stack([index / RATE, values, np.zeros_like(values), np.zeros_like(values)], axis=1)
-    found, _ = truth_of_marks(rows, tool.teeth, period, False, hop)
+    found, _ = truth_of_marks(rows, tool.teeth, period, False, hop, periods)
     at = np.clip(np.searchsorted(motion.time, found.time), 0, len(motion.time) - 1)
     return replace(found, in_cut=motion.in_cut[at], touched=motion.touched[at])
 
@@ -207,6 +213,12 @@ def coloured(rng: np.random.Generator, count: int, corner: float) -> Floats:
     return found
 
 
+def _lasts(lasting: Truth, at: float) -> bool:
+    """True where the truth over longer windows is not sure that there is no chatter at a time [s]."""
+    with np.errstate(invalid="ignore"):
+        return bool(len(lasting.time) and lasting.ratio[np.argmin(np.abs(lasting.time - at))] > NOT)
+
+
 @dataclass(frozen=True)
 class Episode:
     """One true chatter of a cut: kind, begin (20 % crossing), full amplitude and tripled amplitude [s]."""
@@ -237,7 +249,8 @@ def true_kind(cut: Cut, asynchronous: float, half: float) -> ChatterKind | None:
 def true_kinds(cut: Cut, seen: Observed, verdicts: Sequence[Verdict]) -> list[ChatterKind | None]:
     """What each window really was.
 
-    None near thresholds, at entry and exit, where the truth does not reach, and where noise drowns the cut.
+    None near thresholds, at entry and exit, where the truth does not reach, where noise drowns the cut, and where a
+    longer window shows lines that turn too slowly for the shorter ones.
     """
     truth = seen.truth
     drowned = np.hypot(truth.synchronous, truth.asynchronous) < seen.noise
@@ -255,7 +268,8 @@ def true_kinds(cut: Cut, seen: Observed, verdicts: Sequence[Verdict]) -> list[Ch
             found.append(None)
         else:
             kinds = {true_kind(cut, a, h) for a, h in zip(truth.ratio[at], half[at], strict=True)}
-            found.append(kinds.pop() if len(kinds) == 1 else None)
+            kind = kinds.pop() if len(kinds) == 1 else None
+            found.append(None if kind is ChatterKind.STABLE and _lasts(seen.lasting, (begin + end) / 2) else kind)
     return found
 
 

@@ -42,7 +42,7 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
 
     chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
     growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
-    entering: out of the cut before, and the signal at least doubles within the window.
+    entering: out of the cut before, and the signal at least doubles within the window; or it has halved since the last.
     """
     asynchronous = sum(x.energy for x in f.lines)
     total = asynchronous + f.synchronous + f.own_half

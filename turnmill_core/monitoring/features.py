@@ -127,13 +127,14 @@ class _Parts:
 
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
              band: tuple[float, float], wide: tuple[float, float] | None = None,
-             background: Background = NO_BACKGROUND) -> Features:
+             background: Background = NO_BACKGROUND, apart: float = 0.0) -> Features:
     """Features of a window.
 
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
     [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; wide: further
     band in which another speed is taken where it leaves a quarter of the asynchronous energy or less; background:
-    whose tones are no lines of the cut.
+    whose tones are no lines of the cut; apart [bins]: how far from a tooth passing harmonic a line must be (while a
+    cut begins, its harmonics are wide).
     """
     parts, ratio = _followed(p, turns, steady, teeth, lowest, ratio, band)
     if wide is not None and parts.residual.power.sum() > CALM * parts.one.energy().sum():
@@ -151,7 +152,8 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     turning, moved = _turning(parts, clear, noise, tooth, lowest)
     clear = np.where(moved, 0.0, clear)
     first = np.flatnonzero(tooth & inside)[:12]
-    asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear))
+    asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear)
+                         and not _beside_tooth(x, tooth_frequency, apart * found.resolution))
     asynchronous = tuple(x for x in _merged((*asynchronous, *turning), found.resolution) if not background.holds(x))
     if teeth % 2:
         half = _half_odd(parts, p.top, teeth)
@@ -300,6 +302,11 @@ def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
         return False
     here, mirror = near(s.power, s, harmonic * layout.frequency + np.array([offset, -offset]), 0.5 * s.resolution)
     return bool(mirror > 0.25 * here)
+
+
+def _beside_tooth(x: Line, tooth_frequency: float, apart: float) -> bool:
+    """True within `apart` [Hz] of a tooth passing harmonic."""
+    return _distance(x.frequency / tooth_frequency) * tooth_frequency < apart
 
 
 def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> bool:

@@ -24,6 +24,9 @@ STEEP_WINDOWS = 3
 STEEP = 4.0
 """As many windows are enough where the energy grows by this factor over them."""
 
+EVEN = 0.4
+"""What jumps up and stays is no exponential."""
+
 LARGEST_RISE = 10.0
 
 SLOWEST = 2.0
@@ -52,10 +55,13 @@ def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float, tooth_freq
 def rate(history: tuple[Seen, ...], least: int = WINDOWS) -> float:
     """Growth of the amplitude [1/s] by a straight line through its logarithm; NaN where it does not grow steadily.
 
-    Steady: at least `least` windows, each window's share above the one before it.
+    Steady: at least `least` windows, and from each to the next at least EVEN of the mean logarithmic growth.
     """
     shares = np.array([s.share for s in history])
-    if len(history) < least or np.any(shares <= 0) or np.any(np.diff(shares) <= 0):
+    if len(history) < least or np.any(shares <= 0):
+        return math.nan
+    steps = np.diff(np.log(shares))
+    if steps.min() <= max(0.0, EVEN * float(steps.mean())):
         return math.nan
     t = np.array([s.time for s in history])
     t = t - t.mean()

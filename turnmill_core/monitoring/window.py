@@ -51,6 +51,15 @@ LOOK_EVERY = 4
 SURE = 5
 """Calm windows after which the ratio of true to measured speed is no longer sought far away."""
 
+YOUNG_NS = 500_000_000
+"""Time after the beginning of a cut for which its harmonics are wide [ns]: with the depth, a helical tool's phases
+change."""
+
+LONG_AGO_NS = -(2**62)
+
+APART = 1.3
+"""Bins by which a line must then be away from a tooth passing harmonic."""
+
 PULL = 0.3
 """Turn of the first tooth passing harmonic's phase over a window [revolutions] that still tells the speed's error."""
 
@@ -60,7 +69,8 @@ class Tracker:
     """What is carried from window to window of one device: held state, background, scores of speed
     ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
     ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far, runout: of
-    the shank, as fibre probes see it; entered_ns: end of the window with which the cut began."""
+    the shank, as fibre probes see it; entered_ns: end of the window with which the cut began;
+    energy: of the newest window."""
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
@@ -70,7 +80,8 @@ class Tracker:
     middle: float = 1.0
     calm: int = 0
     runout: ShankRunout = field(default_factory=ShankRunout)
-    entered_ns: int = -1
+    entered_ns: int = LONG_AGO_NS
+    energy: float = 0.0
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -156,14 +167,16 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     wide = (middle - told, middle + told) if look and told > config.axis_band else None
     band = (middle - config.axis_band, middle + config.axis_band)
     ratio = min(band[1], max(band[0], ratio))
-    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide,
-                 tracker.background)
+    young = tracker.held.kind is ChatterKind.AIR or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide, tracker.background,
+                 APART if young else 0.0)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
     risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
     entering = tracker.held.kind in (ChatterKind.AIR, ChatterKind.UNKNOWN) and _doubles(p.samples)
-    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering)
+    leaving = not chattering and f.energy < 0.5 * tracker.energy
+    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering or leaving)
     heard = Agreement()
     if not chattering and asked(config, judgement):
         heard = ask(f, others, rate, turned, config.principal_teeth, config.band)
@@ -184,7 +197,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     if plain_comb(f) and abs(math.log(f.change)) < 0.3 and sum(x.energy for x in f.lines) < CALM * f.synchronous:
         middle, calm = f.speed_ratio, min(SURE, calm + 1)
     return Tracker(held, background, scores, f.speed_ratio, history, middle, calm, tracker.runout,
-                   entered), verdict
+                   entered, f.energy), verdict
 
 
 def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:

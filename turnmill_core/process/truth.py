@@ -81,24 +81,24 @@ def principal_turns(tool: Tool) -> int:
 
 
 def truth_of_marks(
-    marks: Floats, teeth: int, turns: int, uneven: bool = False, hop: int = 1,
+    marks: Floats, teeth: int, turns: int, uneven: bool = False, hop: int = 1, periods: int = PERIODS,
 ) -> tuple[Truth, Floats]:
     """Amplitudes of every full window in `marks`, and the marks that later windows need.
 
     marks (n, 4): time [s], relative displacement x, y [m], largest chip [m] since the mark before,
     at equal angles, MARKS_PER_TURN to the revolution, beginning at a principal period. turns: tool
     revolutions in a principal period; uneven: the teeth are not equally spaced;
-    hop: principal periods from window to window.
+    hop: principal periods from window to window; periods: principal periods in a window. A line that turns by less than
+    a quarter over the window counts as synchronous.
     """
     length = MARKS_PER_TURN * turns
-    periods = len(marks) // length
-    windows = max(0, (periods - PERIODS) // hop + 1)
+    windows = max(0, (len(marks) // length - periods) // hop + 1)
     half_order = teeth * turns // 2 if (teeth * turns) % 2 == 0 and not uneven else 0
     values = np.zeros((windows, len(AMPLITUDES)))
     in_cut = np.zeros(windows, dtype=np.bool_)
     touched = np.zeros(windows, dtype=np.bool_)
     for i in range(windows):
-        window = marks[i * hop * length : (i * hop + PERIODS) * length]
+        window = marks[i * hop * length : (i * hop + periods) * length]
         values[i] = _amplitudes(window, length, half_order)
         chips = window[:, 3].reshape(-1, MARKS_PER_TURN).max(axis=1)
         in_cut[i] = bool(np.all(chips > 0))
@@ -109,13 +109,14 @@ def truth_of_marks(
 
 def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, float, float, float, float]:
     """Middle time, synchronous, asynchronous and half-order amplitude and chatter frequency of one window."""
-    values = window[:, 1:3].reshape(PERIODS, 2 * length)
-    step = np.arange(PERIODS) - (PERIODS - 1) / 2
+    values = window[:, 1:3].reshape(-1, 2 * length)
+    periods = len(values)
+    step = np.arange(periods) - (periods - 1) / 2
     mean = values.mean(axis=0)
     residual = values - mean - step[:, None] * ((step @ values) / np.sum(step**2))
     mean = mean.reshape(length, 2)
     synchronous = np.sqrt(np.sum(np.var(mean, axis=0)))
-    asynchronous = np.sqrt(np.vdot(residual, residual) / (length * PERIODS))
+    asynchronous = np.sqrt(np.vdot(residual, residual) / (length * periods))
     half = 0.0
     if half_order:
         lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
