@@ -109,7 +109,7 @@ def hear(task: tuple[str, str, int]) -> list[Heard]:
     what, kind, number = task
     if what == "quiet":
         motion = quiet_motion(kind, number)
-        return [hear_quiet(kind, number, part, motion) for part in range(PARTS)]
+        return [hear_quiet(kind, number, part, motion, tachometer=part == 0) for part in range(PARTS)]
     even = kind in EVEN_KINDS
     heard = hear_cut(kind, number, tachometer=True, prior=even)
     return [replace(heard, by_runout=decided_by_runout(kind, number)) if even else heard]

@@ -56,8 +56,12 @@ def quiet_motion(kind: str, number: int) -> Motion:
     raise ValueError(f"no quiet cut of kind {kind} was found for number {number}")
 
 
-def go_on(motion: Motion, kind: str, number: int, part: int, seconds: float = SECONDS) -> Observed:
-    """`seconds` [s] of the signal that a quiet motion would go on to make; part: which of many."""
+def go_on(motion: Motion, kind: str, number: int, part: int, seconds: float = SECONDS,
+          extra_error: float = 0.0) -> Observed:
+    """`seconds` [s] of the signal that a quiet motion would go on to make.
+
+    part: which of many; extra_error: relative error of the tachometer beyond the drawn one.
+    """
     cut = motion.cut
     rng = generator(kind, number, f"endless {part}")
     name = str(rng.choice(SENSED))
@@ -71,7 +75,7 @@ def go_on(motion: Motion, kind: str, number: int, part: int, seconds: float = SE
     clean = {n: _along(wave, turns) * strength for n, wave in waves.items()}
     levels = {n: float(wave.std()) for n, wave in waves.items()}
     noise = ambient(rng, name, count, turns, levels[name])
-    error = float(rng.choice([0.0, rng.uniform(-2e-3, 2e-3)]))
+    error = float(rng.choice([0.0, rng.uniform(-2e-3, 2e-3)])) + extra_error
     at = np.arange(0, count, RATE / TACHOMETER_HZ)
     measured = speed * 2 * math.pi * np.interp(at, np.arange(count), wander) * (1 + error)
     speeds = tuple(SpindleSpeed(round(k * 1e9 / RATE), float(s)) for k, s in zip(at, measured, strict=True))

@@ -147,18 +147,29 @@ def hear_motion(motion: Motion, tachometer: bool = False, prior: bool = False) -
     truth = np.array([NO_TRUTH if k is None else int(k) for k in true_kinds(cut, seen, verdicts)], dtype=np.int8)
     heard = replace(heard, truth=truth, episode=episode(cut, seen))
     if tachometer:
-        sign = 1 if cut.number % 2 else -1
-        other = _states(listen(config, observe(motion, sign * TACHOMETER_ERROR)))
-        heard = replace(heard, changed=float(np.sum(other != heard.state)))
+        heard = replace(heard, changed=_changed(heard, config, observe(motion, _tachometer_error(cut.number))))
     if prior:
         heard = replace(heard, with_prior=_states(listen(config, seen, wrong_prior(cut))))
     return heard
 
 
-def hear_quiet(kind: str, number: int, part: int, motion: Motion | None = None) -> Heard:
-    """A minute without chatter; motion: of the cut that goes on (None: made again)."""
+def _tachometer_error(number: int) -> float:
+    return TACHOMETER_ERROR if number % 2 else -TACHOMETER_ERROR
+
+
+def _changed(heard: Heard, config: ChatterConfig, wrong: Observed) -> float:
+    """Windows in which the same signal with another tachometer is judged otherwise."""
+    return float(np.sum(_states(listen(config, wrong)) != heard.state))
+
+
+def hear_quiet(kind: str, number: int, part: int, motion: Motion | None = None, tachometer: bool = False) -> Heard:
+    """A minute without chatter; motion: of the cut that goes on (None: made again); tachometer: as in a cut."""
     motion = quiet_motion(kind, number) if motion is None else motion
     seen = go_on(motion, kind, number, part)
-    heard, verdicts = _heard(motion.cut, seen, config_from_operation(motion.cut.operation))
+    config = config_from_operation(motion.cut.operation)
+    heard, verdicts = _heard(motion.cut, seen, config)
+    if tachometer:
+        wrong = go_on(motion, kind, number, part, extra_error=_tachometer_error(number))
+        heard = replace(heard, changed=_changed(heard, config, wrong))
     true = ChatterKind.AIR if kind == "air" else ChatterKind.STABLE
     return replace(heard, kind=kind, truth=np.full(len(verdicts), int(true), dtype=np.int8))

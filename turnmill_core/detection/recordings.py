@@ -54,6 +54,10 @@ SURE, NOT = 0.25, 0.12
 the threshold of 0.2 lies between."""
 
 
+RUNOUT_ONLY = 0.9
+"""Spectral radius below which half-order lines are those of runout alone."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """A simulated cut: samples (n, 3) of SENSED without noise, and its truth; duration [s]."""
@@ -234,16 +238,20 @@ def true_kind(cut: Cut, asynchronous: float, half: float) -> ChatterKind | None:
 
     None: near the threshold.
     With an even number of teeth half-order lines are flip where linear theory, at the true parameters, is
-    unstable, and runout where it is stable (then it is STABLE).
+    unstable, and runout, thus STABLE, where its multipliers are all below RUNOUT_ONLY; between, a tool that leaves the
+    cut may flip although small motions die away.
     """
     if asynchronous > SURE:
         return ChatterKind.HOPF
     if asynchronous > NOT:
         return None
-    unstable = cut.margin.predicted_type in (PredictedType.HOPF, PredictedType.FLIP)
-    if half > SURE and (cut.operation.tool.teeth % 2 == 1 or unstable):
-        return ChatterKind.FLIP
-    return None if half > NOT and (cut.operation.tool.teeth % 2 == 1 or unstable) else ChatterKind.STABLE
+    if cut.operation.tool.teeth % 2:
+        return ChatterKind.FLIP if half > SURE else ChatterKind.STABLE if half <= NOT else None
+    if half <= NOT:
+        return ChatterKind.STABLE
+    if cut.margin.predicted_type in (PredictedType.HOPF, PredictedType.FLIP):
+        return ChatterKind.FLIP if half > SURE else None
+    return ChatterKind.STABLE if cut.margin.spectral_radius < RUNOUT_ONLY else None
 
 
 def true_kinds(cut: Cut, seen: Observed, verdicts: Sequence[Verdict]) -> list[ChatterKind | None]:
@@ -276,8 +284,8 @@ def true_kinds(cut: Cut, seen: Observed, verdicts: Sequence[Verdict]) -> list[Ch
 def episode(cut: Cut, seen: Observed) -> Episode | None:
     """The chatter at the end of a cut: None where it ends without, or is not sure, or is drowned in noise.
 
-    begin: last rising crossing of 20 % by the asynchronous (Hopf) or half-order amplitude (flip); full: it first
-    reaches 90 % of its median over the last 0.6 s; tripled: three times its value at `begin` (NaN: never).
+    full: its amplitude (asynchronous, or for flip half-order) first reaches 90 % of its median over the last 0.6 s;
+    begin: last rising crossing of 20 % before that; tripled: three times its value at `begin` (NaN: never).
     """
     truth = seen.truth
     last = truth.time > truth.time[-1] - 0.6
@@ -290,10 +298,10 @@ def episode(cut: Cut, seen: Observed) -> Episode | None:
         return None
     amplitude = truth.asynchronous if kind is ChatterKind.HOPF else truth.half_order
     grown = truth if kind is ChatterKind.HOPF else replace(truth, asynchronous=amplitude)
-    rising = [c.time for c in crossings(grown) if c.rising]
     entered = float(truth.time[np.argmax(truth.in_cut)])
-    begin = rising[-1] if rising else entered
     full = _first(truth.time, amplitude, 0.9 * float(np.median(amplitude[last])), entered)
+    rising = [c.time for c in crossings(grown) if c.rising and c.time <= full]
+    begin = rising[-1] if rising else entered
     at = float(np.interp(begin, truth.time, amplitude))
     return Episode(kind, begin, full, _first(truth.time, amplitude, 3 * at, begin))
 

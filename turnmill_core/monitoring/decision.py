@@ -126,7 +126,7 @@ LOUD = 1.5
 """Level over what the gate asks for, from which chatter alone shows a cut in half the time."""
 
 
-ENTRY = 2
+ENTRY = 1
 """Further windows that chatter must last while windows reach back into the air."""
 
 
