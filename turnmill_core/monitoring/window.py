@@ -11,28 +11,23 @@ import numpy as np
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.agreement import Agreement, ask, asked, with_others
 from turnmill_core.monitoring.background import Background
+from turnmill_core.monitoring.belief import Belief, after, search
 from turnmill_core.monitoring.channel import choose, others
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
-from turnmill_core.monitoring.features import CALM, Features, features
-from turnmill_core.monitoring.gate import in_cut, learn, loud, plain_comb
+from turnmill_core.monitoring.features import Features, features
+from turnmill_core.monitoring.gate import in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
-from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
+from turnmill_core.monitoring.spectrum import Array, spectrum
 from turnmill_core.monitoring.speed import (
     STEADY,
     Rotation,
     SpindleSpeed,
-    best_ratio,
-    comb_score,
     constant_rotation,
-    family_score,
-    overruled,
-    ratio_grid,
     rotation,
     speed_at,
-    told_by_strongest,
 )
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.tip import ShankRunout, learned, probes_in, tip_in
@@ -43,13 +38,8 @@ LARGEST_SPREAD = 0.1
 """Relative change of the spindle speed from its mean inside a window that is still followed."""
 
 FEWEST_REVOLUTIONS = 6
-SCORE_MEMORY = 0.9
-
 LOOK_EVERY = 4
 """While chatter is held, a wrong tachometer is looked for in every fourth window (they overlap by three quarters)."""
-
-SURE = 5
-"""Calm windows after which the ratio of true to measured speed is no longer sought far away."""
 
 YOUNG_NS = 500_000_000
 """Time after the beginning of a cut for which its harmonics are wide [ns]: with the depth, a helical tool's phases
@@ -60,25 +50,19 @@ LONG_AGO_NS = -(2**62)
 APART = 1.3
 """Bins by which a line must then be away from a tooth passing harmonic."""
 
-PULL = 0.3
-"""Turn of the first tooth passing harmonic's phase over a window [revolutions] that still tells the speed's error."""
-
 
 @dataclass(frozen=True)
 class Tracker:
-    """What is carried from window to window of one device: held state, background, scores of speed
-    ratios on their grid, newest ratio of true to assumed speed, strongest families of the last windows, middle:
-    ratio around which the measured speed is refined, calm: windows of a plain comb and little else so far, runout: of
-    the shank, as fibre probes see it; entered_ns: end of the window with which the cut began;
-    energy: of the newest window."""
+    """What is carried from window to window of one device.
+
+    Held state; background; belief of the speed; history: strongest families of the last windows; runout: of the shank,
+    as fibre probes see it; entered_ns: end of the window with which the cut began; energy: of the newest window.
+    """
 
     held: Held = field(default_factory=Held)
     background: Background = field(default_factory=Background)
-    scores: Array | None = None
-    ratio: float = 1.0
+    belief: Belief = field(default_factory=Belief)
     history: tuple[Seen, ...] = ()
-    middle: float = 1.0
-    calm: int = 0
     runout: ShankRunout = field(default_factory=ShankRunout)
     entered_ns: int = LONG_AGO_NS
     energy: float = 0.0
@@ -147,29 +131,12 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
         turned.turns, len(p.samples), p.rate / rate)
     grid_index = (blank.last_sample + 1) // max(1, round(config.hop * rate))
-    look = tracker.calm < SURE and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)
-    scores, ratio = tracker.scores, tracker.ratio
-    if blank.spindle_speed_source is SpeedSource.NOMINAL:
-        grid = ratio_grid(config.nominal_band)
-        new = _ratio_scores(config, spectrum(p.samples, p.rate, p.top), turned.mean / (2 * math.pi), grid)
-        scores = new if scores is None else SCORE_MEMORY * scores + (1 - SCORE_MEMORY) * new
-        ratio, _ = best_ratio(grid, scores)
-        middle = ratio
-    else:
-        middle = tracker.middle
-        if steady and look:
-            tooth_frequency = config.principal_teeth * turned.mean / (2 * math.pi)
-            whole = spectrum(p.samples, p.rate, p.top)
-            middle = overruled(whole, tooth_frequency, ratio_grid(config.nominal_band), middle, config.axis_band)
-            if loud(config, tracker.background, float(whole.power.sum())):
-                middle = told_by_strongest(whole, tooth_frequency, middle, config.band[0], config.nominal_band)
-    told = min(config.nominal_band, PULL / (config.principal_teeth * float(turns[-1] - turns[0])))
-    wide = (middle - told, middle + told) if look and told > config.axis_band else None
-    band = (middle - config.axis_band, middle + config.axis_band)
-    ratio = min(band[1], max(band[0], ratio))
+    far = not tracker.belief.sure and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)
+    belief, sought = search(config, tracker.belief, p, turned, blank.spindle_speed_source is not SpeedSource.NOMINAL,
+                            far, tracker.background)
     young = tracker.held.kind is ChatterKind.AIR or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
-    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, wide, tracker.background,
-                 APART if young else 0.0)
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], sought.ratio, sought.band, sought.wide,
+                 tracker.background, APART if young else 0.0)
     chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
@@ -193,21 +160,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
-    calm = tracker.calm
-    if plain_comb(f) and abs(math.log(f.change)) < 0.3 and sum(x.energy for x in f.lines) < CALM * f.synchronous:
-        middle, calm = f.speed_ratio, min(SURE, calm + 1)
-    return Tracker(held, background, scores, f.speed_ratio, history, middle, calm, tracker.runout,
-                   entered, f.energy), verdict
-
-
-def _ratio_scores(config: ChatterConfig, whole: Spectrum, frequency: float, grid: Array) -> Array:
-    """Evidence for each ratio of true to nominal speed; large departures need more of it."""
-    scores = comb_score(whole, config.principal_teeth * frequency, grid)
-    strongest = lines(whole, config.band[0], 100.0, 1)
-    if strongest:
-        scores = scores + family_score(whole, strongest[0].frequency, frequency, config.principal_teeth, grid)
-    found: Array = scores - 0.3 * ((grid - 1) / config.nominal_band) ** 2
-    return found
+    return Tracker(held, background, after(belief, f), history, tracker.runout, entered, f.energy), verdict
 
 
 def _doubles(x: Array) -> bool:
