@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from turnmill_core.machine.axes import AXES
 from turnmill_core.monitoring.blocks import Channel, Status
-from turnmill_core.monitoring.sensors import FEWEST_TURNS, shank_runout, tip_motion, without_runout
+from turnmill_core.monitoring.sensors import FEWEST_TURNS, shank_runout, tip_motion, whole_turns, without_runout
 from turnmill_core.operation_sensors import Sensors
 from turnmill_ros import topics
 from turnmill_ros.bag import read_bag
@@ -118,6 +118,6 @@ class TipReader:
         if found is None or any(s.channel.status & Status.SATURATED for s in found[0]):
             return None
         seen, turns = found
-        if math.floor(turns[-1]) - math.ceil(turns[0]) < FEWEST_TURNS:
+        if whole_turns(turns) < FEWEST_TURNS:
             return None
         return shank_runout(np.stack([s.samples for s in seen], axis=1), turns)

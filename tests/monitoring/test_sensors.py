@@ -14,9 +14,9 @@ from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operatio
 from turnmill_core.monitoring.sensors import (
     calibrate,
     implausible,
+    low_orders,
     shank_runout,
     tip_motion,
-    without_orders,
     without_runout,
 )
 from turnmill_core.monitoring.verdict import Reason
@@ -229,9 +229,9 @@ def test_probes_that_cannot_tell_are_refused() -> None:
     assert Sensors((probe,), judged="tip_x").probes("x") == (probe,)
 
 
-def test_low_orders_are_taken_off_whole() -> None:
+def test_low_orders_are_those_of_an_out_of_round_shank() -> None:
     turns = np.linspace(3.3, 13.1, 3000)
     low = 5e-5 * np.cos(2 * math.pi * turns + 1) + 2e-6 * np.sin(10 * math.pi * turns) + 1e-3
-    high = 1e-6 * np.cos(2 * math.pi * 13.4 * turns)
-    assert without_orders(low[:, None], turns, 5) == pytest.approx(0, abs=1e-15)
-    assert without_orders((low + high)[:, None], turns, 5)[:, 0] == pytest.approx(high, abs=2e-8)
+    high = 1e-6 * np.cos(2 * math.pi * 13 * turns)
+    table = low_orders(shank_runout((low + high)[:, None], turns), 5)
+    assert without_runout((low + high)[:, None], turns, table)[:, 0] == pytest.approx(high, abs=2e-8)

@@ -61,13 +61,18 @@ def calibrate(sensors: Sensors, block: SensorBlock) -> SensorBlock:
     return replace(block, channels=tuple(channels), samples=samples)
 
 
+def whole_turns(turns: Floats) -> int:
+    """Whole revolutions, from angle 0 to angle 0, in ascending turns (n,)."""
+    return math.floor(turns[-1]) - math.ceil(turns[0])
+
+
 def shank_runout(displacement: Floats, turns: Floats, points: int = 256) -> Floats:
     """Out-of-roundness (points, k) that probes see while the tool turns in air: mean by angle over whole revolutions.
 
     displacement (n, k) [m]; turns (n,): revolutions at the samples. Raises ValueError below four whole ones.
     """
     first, last = math.ceil(turns[0]), math.floor(turns[-1])
-    if last - first < FEWEST_TURNS:
+    if whole_turns(turns) < FEWEST_TURNS:
         raise ValueError(f"air lasts {turns[-1] - turns[0]:.3g} revolutions, expected at least {FEWEST_TURNS} whole "
                          "ones")
     at = np.arange(first * points, last * points) / points
@@ -85,11 +90,11 @@ def without_runout(displacement: Floats, turns: Floats, runout: Floats) -> Float
     return found
 
 
-def without_orders(displacement: Floats, turns: Floats, orders: int) -> Floats:
-    """Displacement (n, k) [m] less its mean and its best fit at 1 ... orders cycles per revolution; turns (n,)."""
-    angle = 2 * math.pi * turns[:, None] * np.arange(1, orders + 1)
-    base = np.concatenate([np.ones((len(turns), 1)), np.cos(angle), np.sin(angle)], axis=1)
-    found: Floats = displacement - base @ np.linalg.lstsq(base, displacement, rcond=None)[0]
+def low_orders(runout: Floats, orders: int) -> Floats:
+    """The part of a shank's runout (points, k) [m] of 0 to `orders` cycles per revolution."""
+    lines = np.fft.rfft(runout, axis=0)
+    lines[orders + 1:] = 0.0
+    found: Floats = np.fft.irfft(lines, len(runout), axis=0)
     return found
 
 
@@ -104,9 +109,11 @@ def tip_motion(sensors: Sensors, axis: str, displacement: Floats, rate: float) -
     shapes = np.array([p.shape for p in sensors.probes(axis)])
     casing: Floats = np.zeros(len(displacement))
     if sensors.fixture is not None:
-        inverse = np.linalg.pinv(np.stack([shapes, -np.ones(len(shapes))], axis=1))
-        casing = signal.sosfiltfilt(_low_pass(sensors.fixture, rate), displacement @ inverse[1])
-    tip: Floats = (displacement + casing[:, None]) @ shapes / np.sum(shapes**2)
+        # What the straight line of least squares through the displacements over the shapes has at shape 0 is -c.
+        apart = shapes - shapes.mean()
+        line = shapes.mean() * apart / np.sum(apart**2) - 1 / len(shapes)
+        casing = signal.sosfiltfilt(_low_pass(sensors.fixture, rate), np.einsum("nk,k->n", displacement, line))
+    tip: Floats = np.einsum("nk,k->n", displacement + casing[:, None], shapes / np.sum(shapes**2))
     return tip, casing
 
 

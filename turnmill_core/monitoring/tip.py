@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.channel import usable
 from turnmill_core.monitoring.config import ChatterConfig
-from turnmill_core.monitoring.sensors import FEWEST_TURNS, shank_runout, tip_motion, without_orders, without_runout
+from turnmill_core.monitoring.sensors import (
+    FEWEST_TURNS,
+    low_orders,
+    shank_runout,
+    tip_motion,
+    whole_turns,
+    without_runout,
+)
 from turnmill_core.monitoring.speed import SpindleSpeed
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.verdict import Reason
@@ -93,22 +100,23 @@ def _blind(reason: Reason, text: str) -> Seen:
 
 def tip_in(config: ChatterConfig, seen: Seen, runout: ShankRunout, rate: float) -> Floats:
     """Motion of the tool tip (n,) [m] along the judged axis in a window."""
-    displacement = seen.displacement
+    displacement, turns = seen.displacement, seen.turns
     if not len(displacement):
         return np.zeros(0)
-    if seen.turns is not None:
-        if runout.known and runout.table is not None:
-            displacement = without_runout(displacement, seen.turns, runout.table)
-        else:
-            displacement = without_orders(displacement, seen.turns, ROUND_ORDERS)
-    tip, _ = tip_motion(config.sensors, config.channel[-1], displacement - displacement.mean(axis=0), rate)
+    if turns is not None:
+        table = runout.table if runout.known else None
+        if table is None and whole_turns(turns) >= FEWEST_TURNS:
+            table = low_orders(shank_runout(displacement, turns), ROUND_ORDERS)
+        if table is not None:
+            displacement = without_runout(displacement, turns, table)
+    tip, _ = tip_motion(config.sensors, config.channel[-1], displacement, rate)
     return tip
 
 
 def learned(runout: ShankRunout, seen: Seen) -> ShankRunout:
     """Runout after a window of air."""
     turns = seen.turns
-    if turns is None or math.floor(turns[-1]) - math.ceil(turns[0]) < FEWEST_TURNS:
+    if turns is None or whole_turns(turns) < FEWEST_TURNS:
         return runout
     new = shank_runout(seen.displacement, turns)
     if runout.table is None or runout.table.shape != new.shape:
