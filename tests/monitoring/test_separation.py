@@ -16,7 +16,15 @@ from turnmill_core.monitoring.separation import (
     synchronous,
     uniform_in_time,
 )
-from turnmill_core.monitoring.speed import SpindleSpeed, constant_rotation, remember, rotation, speed_at
+from turnmill_core.monitoring.speed import (
+    Pages,
+    SpindleSpeed,
+    constant_rotation,
+    joined,
+    remember,
+    rotation,
+    speed_at,
+)
 
 RATE, F = 12800.0, 55.83
 
@@ -98,9 +106,11 @@ def test_layout_back_to_time() -> None:
 
 
 def test_rotation_is_the_exact_integral_of_linear_speeds() -> None:
-    held: tuple[SpindleSpeed, ...] = ()
-    for k in range(60):
-        held = remember(held, SpindleSpeed(k * 4_000_000, 300 + 52.36 * k * 0.004))
+    pages: Pages = ()
+    for k in range(150):
+        pages = remember(pages, SpindleSpeed(k * 4_000_000, 300 + 52.36 * k * 0.004))
+    held = joined(pages)
+    assert (len(pages), len(held)) == (3, 150)
     found = rotation(held, 10_000_000, 10_000_000 + round(0.2e9), 2561, RATE, 10**9)
     assert found is not None
     t = np.arange(2561) / RATE
@@ -114,5 +124,12 @@ def test_uncovered_windows_have_no_rotation() -> None:
     assert rotation(held, 0, 20_000_000, 100, RATE, 10**9) is None
     assert rotation(held, 0, 10_000_000, 100, RATE, 5_000_000) is None
     assert math.isnan(speed_at(held, 20_000_000, 10**9))
-    assert remember(held, SpindleSpeed(5_000_000, 1.0)) == held
-    assert remember(held, SpindleSpeed(20_000_000, math.nan)) == held
+
+
+def test_only_newer_finite_speeds_are_remembered_and_not_for_ever() -> None:
+    pages = ((SpindleSpeed(0, 300.0), SpindleSpeed(10_000_000, 300.0)),)
+    assert remember(pages, SpindleSpeed(5_000_000, 1.0)) == pages
+    assert remember(pages, SpindleSpeed(20_000_000, math.nan)) == pages
+    for k in range(2, 5000):
+        pages = remember(pages, SpindleSpeed(k * 10_000_000, 300.0))
+    assert 1000 <= len(joined(pages)) < 1100

@@ -18,7 +18,7 @@ from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.blocks import SensorBlock
 from turnmill_core.monitoring.config import ChatterConfig, config_from_operation
 from turnmill_core.monitoring.sensors import calibrate
-from turnmill_core.monitoring.speed import SpindleSpeed, remember
+from turnmill_core.monitoring.speed import Pages, SpindleSpeed, joined, remember
 from turnmill_core.monitoring.stream import Stream
 from turnmill_core.monitoring.verdict import Reason, Verdict
 from turnmill_core.monitoring.window import Tracker, judge_window
@@ -45,7 +45,7 @@ class MonitorState:
 
     streams: tuple[Stream, ...] = ()
     trackers: tuple[tuple[str, Tracker], ...] = ()
-    speeds: tuple[SpindleSpeed, ...] = ()
+    speeds: Pages = ()
     prior: Prior | None = None
     recorded: tuple[RecordedPrior, ...] = ()
 
@@ -123,15 +123,17 @@ def _judge_ready(config: ChatterConfig, state: MonitorState, last: bool) -> tupl
                 prior = None if at is None else recorded[at].prior
                 recorded = recorded if at is None else recorded[at + 1:]
             trackers[s.device], verdict = judge_window(config, trackers.get(s.device, Tracker()), s, s.next_end,
-                                                       state.speeds, prior)
+                                                       joined(state.speeds), prior)
             verdicts.append(verdict)
             s = streams.advance(s, hop, longest)
         if s.next_end <= s.end or newest[s.device] is held:
             kept.append(s)
+    if not verdicts and len(kept) == len(state.streams):
+        return state, ()
     return replace(state, streams=tuple(kept), trackers=tuple(trackers.items()), recorded=recorded), tuple(verdicts)
 
 
-def _waits_for_speed(config: ChatterConfig, speeds: tuple[SpindleSpeed, ...], end_ns: int, newest: Stream) -> bool:
-    if not config.expect_axes or (speeds and speeds[-1].stamp_ns >= end_ns):
+def _waits_for_speed(config: ChatterConfig, speeds: Pages, end_ns: int, newest: Stream) -> bool:
+    if not config.expect_axes or (speeds and speeds[-1][-1].stamp_ns >= end_ns):
         return False
     return newest.stamp(newest.end - 1) - end_ns <= round(config.speed_timeout * 1e9)

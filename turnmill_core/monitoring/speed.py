@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -25,15 +25,24 @@ class SpindleSpeed:
     angle: float = math.nan
 
 
-def remember(held: tuple[SpindleSpeed, ...], item: SpindleSpeed) -> tuple[SpindleSpeed, ...]:
+Pages = tuple[tuple[SpindleSpeed, ...], ...]
+PAGE = 64
+"""Remembered speeds come in pages of so many, none of them empty: a new one copies the newest page only."""
+
+
+def remember(pages: Pages, item: SpindleSpeed) -> Pages:
     """Speeds in order of stamp with `item` (magnitude); left out: one not newer than the newest, or not finite."""
-    item = SpindleSpeed(item.stamp_ns, abs(item.speed), item.angle)
-    if not math.isfinite(item.speed) or (held and item.stamp_ns <= held[-1].stamp_ns):
-        return held
-    drop = 0
-    while drop < len(held) and held[drop].stamp_ns < item.stamp_ns - MEMORY_NS:
-        drop += 1
-    return (*held[drop:], item)
+    item = SpindleSpeed(item.stamp_ns, abs(item.speed))
+    if not math.isfinite(item.speed) or (pages and item.stamp_ns <= pages[-1][-1].stamp_ns):
+        return pages
+    if pages and len(pages[-1]) < PAGE:
+        return (*pages[:-1], (*pages[-1], item))
+    return (*(page for page in pages if page[-1].stamp_ns >= item.stamp_ns - MEMORY_NS), (item,))
+
+
+def joined(pages: Pages) -> tuple[SpindleSpeed, ...]:
+    """All remembered speeds."""
+    return tuple(chain.from_iterable(pages))
 
 
 def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int) -> float:
