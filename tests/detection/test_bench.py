@@ -113,16 +113,18 @@ def test_indicators_stand_beside_ours_at_their_thresholds() -> None:
 
 
 def test_score_grows_with_every_window_of_an_alarm_and_stays_below_it_elsewhere() -> None:
-    def window(kind: ChatterKind, confidence: float, ratio: float, half: float = math.nan) -> Verdict:
-        return Verdict(0, 1, 1, "d", 1, "c", kind, Reason.NONE, "", asynchronous_ratio=ratio, half_order_ratio=half,
+    def window(kind: ChatterKind, confidence: float, ratio: float, half: float = math.nan,
+               reason: Reason = Reason.NONE) -> Verdict:
+        return Verdict(0, 1, 1, "d", 1, "c", kind, reason, "", asynchronous_ratio=ratio, half_order_ratio=half,
                        confidence=confidence)
 
     found = scores([window(ChatterKind.UNKNOWN, 0.0, math.nan), window(ChatterKind.STABLE, 0.9, 0.02, 0.5),
                     window(ChatterKind.MARGINAL, 0.6, 0.03), window(ChatterKind.HOPF, 0.9, 0.3),
                     window(ChatterKind.FLIP, 0.99, 0.3), window(ChatterKind.AIR, 0.2, 0.9),
-                    window(ChatterKind.HOPF, 1.0, 0.3)])
-    assert found == pytest.approx([0, 0.05, 0.015, 1 + math.log(10), 1 + math.log(1000), 0.72, 1 + math.log(1e4)],
-                                  abs=1e-4)
+                    window(ChatterKind.HOPF, 1.0, 0.3), window(ChatterKind.HOPF, 0.9, 0.3, reason=Reason.PERSISTENCE),
+                    window(ChatterKind.HOPF, 0.9, 0.3)])
+    assert found == pytest.approx([0, 0.05, 0.015, 1 + math.log(10), 1 + math.log(1000), 0.72, 1 + math.log(1e4), 1.0,
+                                   1 + math.log(10)], abs=1e-4)
 
 
 def test_gate_opens_where_a_window_is_twice_as_loud_as_the_air() -> None:

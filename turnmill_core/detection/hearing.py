@@ -24,7 +24,7 @@ from turnmill_core.detection.recordings import (
 )
 from turnmill_core.detection.rivals import RIVALS, rate_windows
 from turnmill_core.monitoring.chatter import ChatterConfig, config_from_operation, finish, initial, update
-from turnmill_core.monitoring.verdict import ChatterKind, Verdict
+from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
 from turnmill_core.operation import Operation
 from turnmill_core.prediction import Prior, flip_multiplier
 from turnmill_core.stability.margin import stability_point
@@ -102,14 +102,15 @@ SUREST = 0.9999
 def scores(verdicts: Sequence[Verdict]) -> NDArray[np.float32]:
     """How strongly verdicts speak of chatter (n,), from what is published of them up to each window.
 
-    In an alarm: 1 + the sum of -ln(1 - confidence) over its windows so far, the improbability of all of them being
-    wrong. Else below 1: the asynchronous or the half-order ratio, whichever is larger, times the probability of
-    chatter, which is one half where the verdict is undecided and what the confidence leaves of 1 where it is another.
+    In an alarm: 1 + the sum of -ln(1 - confidence) over the windows in a row that show it by themselves, the
+    improbability of all of them being wrong; 1 where it is only held. Else below 1: the asynchronous or the half-order
+    ratio, whichever is larger, times the probability of chatter, which is one half where the verdict is undecided and
+    what the confidence leaves of 1 where it is another.
     """
     found, run = np.zeros(len(verdicts), dtype=np.float32), 0.0
     for k, v in enumerate(verdicts):
         if v.state in ALARMS:
-            run -= math.log(1 - min(SUREST, v.confidence))
+            run = 0.0 if v.reason is Reason.PERSISTENCE else run - math.log(1 - min(SUREST, v.confidence))
             found[k] = 1 + run
             continue
         run = 0.0
