@@ -26,6 +26,9 @@ MARGIN_NS = 100_000_000
 """Time before and after a stretch that is read as well: the filters settle there."""
 
 LONGEST_AIR_NS = 5_000_000_000
+LATE_NS = 300_000_000
+"""Time before the end of a stretch of air in which the tool may be in the cut already: a verdict comes later."""
+
 SPINDLE = AXES.index("s")
 
 
@@ -114,7 +117,7 @@ class TipReader:
         if not air:
             return None
         start, end = max(air, key=lambda span: span[1] - span[0])
-        found = self._read(start, min(end, start + LONGEST_AIR_NS))
+        found = self._read(start, min(end - LATE_NS, start + LONGEST_AIR_NS))
         if found is None or any(s.channel.status & Status.SATURATED for s in found[0]):
             return None
         seen, turns = found
