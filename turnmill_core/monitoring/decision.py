@@ -42,7 +42,7 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
 
     chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
     growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
-    entering: out of the cut before, and the signal at least doubles within the window; or it has halved since the last.
+    entering: out of the cut before, and the signal at least doubles within the window; or it has fallen since the last.
     """
     asynchronous = sum(x.energy for x in f.lines)
     total = asynchronous + f.synchronous + f.own_half
@@ -59,8 +59,8 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     changing = not chattering and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT
     if kind is not ChatterKind.STABLE and (changing or entering):
         kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
-        what = "the tooth passing harmonics change" if changing else "the signal changes"
-        text = f"entry or exit: {what} {f.change if changing else 2:.2g}-fold or more within the window; else {text}"
+        what = f"the tooth passing harmonics change {f.change:.2g}-fold" if changing else "the signal grows or falls"
+        text = f"entry or exit: {what}; else {text}"
     return Judgement(kind, reason, text, ratio, half)
 
 
@@ -130,17 +130,18 @@ ENTRY = 1
 """Further windows that chatter must last while windows reach back into the air."""
 
 
-def windows_to_enter(config: ChatterConfig, f: Features, background: Background, held: Held, growing: bool,
+def windows_to_enter(config: ChatterConfig, f: Features, background: Background, held: Held, sure: bool,
                      fresh: bool = False) -> int:
     """Windows in a row that chatter must last before it begins.
 
-    One in a cut where a steady growth over several windows has led to it (growing), else enter_dwell; ENTRY more in
-    windows that began before the cut (fresh), where the averages still hold air. Longer where
+    One in a cut where a steady growth over several windows has led to it, or other channels hear it too while the
+    signal does not fall (sure), else enter_dwell; ENTRY more in windows that began before the cut (fresh), where the
+    averages still hold air. Longer where
     nothing else shows a cut, neither a plain comb now nor a cut before: machine sounds out of the cut can look like
     a family for some tenths of a second; half as long where it is far louder than the air before.
     """
     if plain_comb(f) or held.kind not in (ChatterKind.AIR, ChatterKind.UNKNOWN):
-        return config.enter_dwell + ENTRY if fresh else 1 if growing else config.enter_dwell
+        return config.enter_dwell + ENTRY if fresh else 1 if sure else config.enter_dwell
     floor = background.energy if config.noise_floor is None else config.noise_floor**2
     loud = math.isfinite(floor) and f.energy > (LOUD * config.gate_ratio) ** 2 * floor
     return max(config.enter_dwell, config.lone_dwell // 2 if loud else config.lone_dwell)

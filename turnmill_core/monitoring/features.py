@@ -210,8 +210,11 @@ def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
         error = float(np.clip(ratio * (1 + found.speed), *band)) / ratio - 1
         if abs(error) * length * teeth < PHASE:
             break
-        assumed, ratio = followed(assumed, length, Drift(error)), ratio * (1 + error)
-        parts = _separate(p, assumed, steady, teeth, lowest)
+        tried = followed(assumed, length, Drift(error))
+        better = _separate(p, tried, steady, teeth, lowest)
+        if better.residual.power.sum() > parts.residual.power.sum():
+            break
+        assumed, ratio, parts = tried, ratio * (1 + error), better
         found = _drift(parts, p, teeth)
     for _ in range(2):
         ramp = min(LARGEST_RAMP / length, max(-LARGEST_RAMP / length, found.ramp))

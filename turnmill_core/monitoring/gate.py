@@ -13,11 +13,14 @@ from turnmill_core.monitoring.spectrum import Spectrum
 def learn(config: ChatterConfig, background: Background, f: Features, whole: Spectrum) -> Background:
     """Background moved towards a window judged as air (its features and spectrum).
 
-    By a twentieth; by a five-hundredth where the window is louder than the gate allows for air, so that a
-    coolant pump that starts is learned within half a minute, but a passing sound is not. A window
-    with a strong family (a tenth of the energy, with sidebands) is not learned: it may be chatter.
+    The first whatever it holds, unless it would show a cut; later by a twentieth; by a five-hundredth where the window
+    is louder than the gate allows for air, so that a coolant pump that starts is learned within half a minute, but a
+    passing sound is not. Later windows with a strong family (a tenth of the energy, with sidebands) are not learned:
+    they may be chatter.
     """
-    if f.chatter is not None and f.chatter.sidebands and f.chatter.energy > 0.1 * f.energy:
+    known = background.power is not None
+    if f.chatter is not None and (f.chatter.sidebands and f.chatter.energy > 0.1 * f.energy if known
+                                  else _lone_family(f, False)):
         return background
     quiet = f.energy < config.gate_ratio**2 * background.energy
     return background.towards(f.energy, whole, 0.05 if quiet else 0.002)
@@ -43,7 +46,7 @@ def in_cut(config: ChatterConfig, f: Features, background: Background, chatterin
     """True where the window shows a cut.
 
     Either the tooth passing comb is plain, or one family of lines spaced by the tooth passing
-    frequency holds a fifth of the energy, and the level exceeds the floor (where one is known) by the
+    frequency is strong (:func:`_lone_family`), and the level exceeds the floor (where one is known) by the
     gate ratio; while chatter is held (chattering) a tenth is enough. Above a known floor it is enough,
     too, that half of the energy lies at spindle harmonics (the first left out) and in the family.
     """
@@ -58,4 +61,14 @@ def in_cut(config: ChatterConfig, f: Features, background: Background, chatterin
         return True
     if c is None:
         return False
-    return c.energy > 0.1 * f.energy if chattering else c.sidebands >= 1 and c.energy > 0.2 * f.energy
+    return c.energy > 0.1 * f.energy if chattering else _lone_family(f, math.isfinite(floor))
+
+
+def _lone_family(f: Features, floor_known: bool) -> bool:
+    """True where a family by itself shows a cut: a sideband and a fifth of the energy.
+
+    Where no floor is known, two sidebands and half of it: two tones of the machine may happen to be a tooth passing
+    frequency apart.
+    """
+    c, (sidebands, share) = f.chatter, (1, 0.2) if floor_known else (2, 0.5)
+    return c is not None and c.sidebands >= sidebands and c.energy > share * f.energy

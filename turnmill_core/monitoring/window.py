@@ -45,6 +45,9 @@ YOUNG_NS = 500_000_000
 """Time after the beginning of a cut for which its harmonics are wide [ns]: with the depth, a helical tool's phases
 change."""
 
+FALLING = 0.7
+"""Energy over that of the window before, below which the tool leaves the cut: chatter that begins adds to it."""
+
 LONG_AGO_NS = -(2**62)
 
 APART = 1.3
@@ -142,7 +145,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
     risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
     entering = tracker.held.kind in (ChatterKind.AIR, ChatterKind.UNKNOWN) and _doubles(p.samples)
-    leaving = not chattering and f.energy < 0.5 * tracker.energy
+    leaving = not chattering and f.energy < FALLING * tracker.energy
     judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering or leaving)
     heard = Agreement()
     if not chattering and asked(config, judgement):
@@ -150,7 +153,8 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
         judgement = with_others(judgement, heard)
     fresh = judgement.kind is ChatterKind.HOPF and (
         tracker.held.kind is ChatterKind.AIR or blank.window_start_ns < tracker.entered_ns)
-    enter = windows_to_enter(config, f, tracker.background, tracker.held, risen > 1 or bool(heard.confirm), fresh)
+    sure = risen > 1 or (bool(heard.confirm) and f.energy >= tracker.energy)
+    enter = windows_to_enter(config, f, tracker.background, tracker.held, sure, fresh)
     held = persist(config, tracker.held, judgement.kind, enter)
     entered = blank.window_end_ns if tracker.held.kind is ChatterKind.AIR is not held.kind else tracker.entered_ns
     background = tracker.background
