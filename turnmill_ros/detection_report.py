@@ -147,8 +147,8 @@ def detection_report(output: Path, plan: Plan, found: Tally) -> None:
         "<h2>Beside published indicators</h2>",
         "<p class=note>All by the same rules: an alarm needs two windows in a row; found means an alarm of any "
         f"kind within {LATE:g} s of full amplitude; a false alarm begins more than {EARLY:g} s before "
-        "anything that is not surely free of chatter. The indicators get the true rotation, and a gate: they are heard where "
-        "the level is twice that of the air.</p>",
+        "anything that is not surely free of chatter. The indicators get the true rotation, and a gate: they are "
+        "heard where the level is twice that of the air.</p>",
         html_table(comparison[1], comparison[0]),
         f"<p class=note>Fewer false alarms than ours: {'; '.join(behind(found)) or 'none, at any recall'}.</p>",
     ], [("Pictures", false_alarm_curves(found)), ("", confusion_picture(found)), ("", delays_picture(found))], [])
