@@ -63,7 +63,7 @@ def calibrate(sensors: Sensors, block: SensorBlock) -> SensorBlock:
 
 def whole_turns(turns: Floats) -> int:
     """Whole revolutions, from angle 0 to angle 0, in ascending turns (n,)."""
-    return math.floor(turns[-1]) - math.ceil(turns[0])
+    return int(math.floor(turns[-1]) - math.ceil(turns[0]))
 
 
 def shank_runout(displacement: Floats, turns: Floats, points: int = 256) -> Floats:

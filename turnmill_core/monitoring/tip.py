@@ -99,7 +99,7 @@ def _blind(reason: Reason, text: str) -> Seen:
 
 
 def tip_in(config: ChatterConfig, seen: Seen, runout: ShankRunout, rate: float) -> Floats:
-    """Motion of the tool tip (n,) [m] along the judged axis in a window."""
+    """Motion of the tool tip (n,) [m] along the judged axis in a window sampled at `rate` [Hz]."""
     displacement, turns = seen.displacement, seen.turns
     if not len(displacement):
         return np.zeros(0)

@@ -80,7 +80,7 @@ def measure(sensor: Sensor, value: Floats, noise: Floats | float = 0.0) -> NDArr
 
 
 def out_of_roundness(sensor: Sensor, tool_angle: Floats) -> Floats:
-    """Out-of-roundness of the shank [m] (n,) where a probe looks, at angles of the tool [rad] (n,).
+    """Out-of-roundness of the shank [m] (n,) where a probe looks, at tool_angle (n,) [rad].
 
     The shank has its summits of all orders at the angle 0 of the tool; x lies a quarter of a turn after y.
     """
