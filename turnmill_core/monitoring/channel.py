@@ -46,7 +46,7 @@ def others(s: Stream, start: int, end: int, judged: str) -> Iterator[tuple[str, 
 
 
 def usable(x: NDArray[np.float32], status: Status, channel: Channel) -> tuple[Reason, str]:
-    """Why a channel's samples cannot be judged, NONE where they can, and in words."""
+    """Why the samples x (n,) of a channel cannot be judged, NONE where they can, and in words."""
     name = channel.name
     if not np.isfinite(x).all():
         return Reason.BAD_SAMPLES, f"channel {name} holds values that are no numbers"
