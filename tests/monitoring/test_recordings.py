@@ -29,8 +29,8 @@ def test_face_mill_chatter_is_hopf_at_899_hz(recordings: Path) -> None:
     steady = [v.chatter_frequency for v in hopf if v.window_end_ns > 3e9]
     assert np.median(steady) == pytest.approx(899, abs=2)
     assert np.mean(np.abs(np.array(steady) - 899) < 3) > 0.95
-    family = np.array([v.chatter_family for v in hopf if len(v.chatter_family) == 3][-1])
-    assert np.diff(family) == pytest.approx(165.6, abs=2)
+    beside = [v for v in hopf if any(abs(abs(x - v.chatter_frequency) - 165.6) < 2 for x in v.chatter_family)]
+    assert len(beside) > 0.9 * len(hopf)
 
 
 @pytest.mark.parametrize("teeth", [2, 3, 4, 5, 6])

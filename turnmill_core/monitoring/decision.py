@@ -19,6 +19,9 @@ TRANSIENT = math.log(2.0)
 WARNING = 0.5
 """A family that will pass the enter threshold in less than this [s] makes the cut marginal."""
 
+LEAST = 0.25
+"""Share, over the one at which chatter begins, from which its growth is believed."""
+
 CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
 
 
@@ -72,7 +75,7 @@ def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, chatteri
         share = c.energy / (c.energy + f.synchronous + f.own_half)
         evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
         now = risen * c.energy / (risen * c.energy + f.synchronous + f.own_half)
-        if evident and share < threshold < now:
+        if evident and config.enter_ratio * LEAST < share < threshold < now:
             return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
                     f"lines at {c.frequency:.1f} Hz grow exponentially to {100 * now:.0f} % of the energy")
         if evident and share > threshold:

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnmill_core.monitoring import _kernels
-
 WINDOWS = 6
 """Windows over which a growth is looked at."""
 
@@ -45,9 +43,10 @@ class Seen:
 def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float, tooth_frequency: float) -> tuple[Seen, ...]:
     """History with `seen`; begins anew where the family moved by more than `tolerance` [Hz].
 
-    The strongest member of a family may change: families are compared as |H + i f_tooth|.
+    The strongest member of a family may change: families are compared as H + i f_tooth.
     """
-    if history and _kernels.distance(seen.frequency, history[-1].frequency, tooth_frequency) > tolerance:
+    apart = (seen.frequency - history[-1].frequency) / tooth_frequency if history else 0.0
+    if abs(apart - round(apart)) * tooth_frequency > tolerance:
         return (seen,)
     return (*history[-WINDOWS + 1:], seen)
 
@@ -68,15 +67,18 @@ def rate(history: tuple[Seen, ...], least: int = WINDOWS) -> float:
     return float(np.sum(t * np.log(shares)) / np.sum(t**2) / 2)
 
 
-def rise(history: tuple[Seen, ...], seconds: float) -> float:
+def rise(history: tuple[Seen, ...], seconds: float, evident: bool = True) -> float:
     """Energy at the end of the newest window over its mean in it, while it grows steadily; else 1.
 
     seconds [s]: length of the window. Half of it lies between its middle, which the mean is about, and its end.
+    evident: sidebands show that the line is of the cut; without them it must grow by STEEP, as noise may grow a little
+    through windows that overlap.
     """
-    found = rate(history[-RISE_WINDOWS:], RISE_WINDOWS)
-    if math.isnan(found):
-        newest = history[-STEEP_WINDOWS:]
-        found = rate(newest, STEEP_WINDOWS) if newest and newest[-1].share > STEEP * newest[0].share else math.nan
+    found = math.nan
+    for count, steep in ((RISE_WINDOWS, not evident), (STEEP_WINDOWS, True)):
+        newest = history[-count:]
+        if math.isnan(found) and newest and (not steep or newest[-1].share > STEEP * newest[0].share):
+            found = rate(newest, count)
     return min(LARGEST_RISE, math.exp(found * seconds)) if found >= SLOWEST else 1.0
 
 

@@ -48,6 +48,7 @@ change."""
 FALLING = 0.7
 """Energy over that of the window before, below which the tool leaves the cut: chatter that begins adds to it."""
 
+OUTSIDE = (ChatterKind.AIR, ChatterKind.UNKNOWN)
 LONG_AGO_NS = -(2**62)
 
 APART = 1.3
@@ -137,26 +138,25 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     far = not tracker.belief.sure and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)
     belief, sought = search(config, tracker.belief, p, turned, blank.spindle_speed_source is not SpeedSource.NOMINAL,
                             far, tracker.background)
-    young = tracker.held.kind is ChatterKind.AIR or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
+    outside, chattering = tracker.held.kind in OUTSIDE, tracker.held.kind in CHATTER
+    young = outside or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
     f = features(p, turns, steady, config.principal_teeth, config.band[0], sought.ratio, sought.band, sought.wide,
                  tracker.background, APART if young else 0.0)
-    chattering = tracker.held.kind in CHATTER
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
-    risen = rise(history, (blank.window_end_ns - blank.window_start_ns) * 1e-9)
-    entering = tracker.held.kind in (ChatterKind.AIR, ChatterKind.UNKNOWN) and _doubles(p.samples)
+    risen = rise(history, f.seconds, f.chatter is not None and f.chatter.sidebands > 0)
+    entering = outside and _doubles(p.samples)
     leaving = not chattering and f.energy < FALLING * tracker.energy
     judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering or leaving)
     heard = Agreement()
     if not chattering and asked(config, judgement):
         heard = ask(f, others, rate, turned, config.principal_teeth, config.band)
         judgement = with_others(judgement, heard)
-    fresh = judgement.kind is ChatterKind.HOPF and (
-        tracker.held.kind is ChatterKind.AIR or blank.window_start_ns < tracker.entered_ns)
+    fresh = judgement.kind is ChatterKind.HOPF and (outside or blank.window_start_ns < tracker.entered_ns)
     sure = risen > 1 or (bool(heard.confirm) and f.energy >= tracker.energy)
     enter = windows_to_enter(config, f, tracker.background, tracker.held, sure, fresh)
     held = persist(config, tracker.held, judgement.kind, enter)
-    entered = blank.window_end_ns if tracker.held.kind is ChatterKind.AIR is not held.kind else tracker.entered_ns
+    entered = blank.window_end_ns if outside and held.kind not in OUTSIDE else tracker.entered_ns
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
         background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
@@ -180,9 +180,8 @@ def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
     if c is None or not (c.sidebands or plain_comb(f)) or c.explained < 0.5:
         return (), math.inf
     share = c.energy / (c.energy + f.synchronous + f.own_half)
-    tooth_frequency = f.frequency * config.principal_teeth
-    tolerance = min(0.02 * c.frequency, 0.1 * tooth_frequency)
-    history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), tolerance, tooth_frequency)
+    history = remember(history, Seen(end_ns * 1e-9, c.frequency, share), 1 / f.seconds,
+                       f.frequency * config.principal_teeth)
     return history, time_to(history, config.enter_ratio)
 
 
