@@ -10,8 +10,8 @@ import pytest
 from tests.monitoring.signals import RATE, blocks, by_stamp, noise, phase, speeds, watch
 from turnmill_core.monitoring.chatter import ChatterConfig
 from turnmill_core.monitoring.spectrum import spectrum
-from turnmill_core.monitoring.speed import told_by_strongest
-from turnmill_core.monitoring.verdict import ChatterKind
+from turnmill_core.monitoring.speed import SpindleSpeed, held_until, told_by_strongest
+from turnmill_core.monitoring.verdict import ChatterKind, SpeedSource
 
 SPEED = 8000 * 2 * math.pi / 60
 TEETH = 5
@@ -48,3 +48,21 @@ def test_one_harmonic_at_a_wrong_tachometer_is_no_chatter(error: float) -> None:
     late = [v for v in verdicts if v.window_end_ns > 1.3e9]
     assert {v.state for v in late} == {ChatterKind.STABLE}
     assert late[-1].spindle_speed == pytest.approx(SPEED, rel=1e-3)
+
+
+def test_the_newest_speed_is_held_for_a_moment() -> None:
+    held = (SpindleSpeed(0, 100.0), SpindleSpeed(10, 101.0))
+    assert held_until(held, 10, 5) is held
+    assert held_until(held, 14, 5) == (*held, SpindleSpeed(14, 101.0))
+    assert held_until(held, 16, 5) is held
+    assert held_until((), 16, 5) == ()
+
+
+def test_windows_at_the_end_of_the_axis_states_use_them() -> None:
+    turns = phase(SPEED, 2.0)
+    x = np.cos(2 * math.pi * TEETH * turns) + noise(len(turns), 2e-3, 2)
+    given = [s for s in speeds(0.99 * SPEED, 2.0) if s.stamp_ns < 1.97e9]
+    config = ChatterConfig(teeth=TEETH, nominal_speed=SPEED)
+    verdicts = watch(config, by_stamp(list(blocks(x)), given))
+    assert verdicts[-1].window_end_ns > 1.99e9
+    assert verdicts[-1].spindle_speed_source is not SpeedSource.NOMINAL

@@ -43,7 +43,7 @@ class Seen:
 def remember(history: tuple[Seen, ...], seen: Seen, tolerance: float, tooth_frequency: float) -> tuple[Seen, ...]:
     """History with `seen`; begins anew where the family moved by more than `tolerance` [Hz].
 
-    The strongest member of a family may change: families are compared as H + i f_tooth.
+    The strongest member of a family may change: families are compared as H + i tooth_frequency [Hz].
     """
     apart = (seen.frequency - history[-1].frequency) / tooth_frequency if history else 0.0
     if abs(apart - round(apart)) * tooth_frequency > tolerance:

@@ -45,6 +45,13 @@ def joined(pages: Pages) -> tuple[SpindleSpeed, ...]:
     return tuple(chain.from_iterable(pages))
 
 
+def held_until(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_ns: int) -> tuple[SpindleSpeed, ...]:
+    """Speeds with the newest one held until an instant, where that is at most `longest_ns` later."""
+    if not held or not 0 < stamp_ns - held[-1].stamp_ns <= longest_ns:
+        return held
+    return (*held, SpindleSpeed(stamp_ns, held[-1].speed))
+
+
 def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int) -> float:
     """Speed at an instant [rad/s], linear between its neighbours; NaN without neighbours within `longest_gap_ns`."""
     for later, earlier in zip(reversed(held), reversed(held[:-1]), strict=False):

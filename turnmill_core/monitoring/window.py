@@ -26,6 +26,7 @@ from turnmill_core.monitoring.speed import (
     Rotation,
     SpindleSpeed,
     constant_rotation,
+    held_until,
     rotation,
     speed_at,
 )
@@ -76,6 +77,7 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
                  prior: Prior | None) -> tuple[Tracker, Verdict]:
     """Verdict on the window that ends before sample `end`, and the tracker after it."""
     gap_ns = round(config.speed_timeout * 1e9)
+    speeds = held_until(speeds, s.stamp(end - 1), round(config.hop * 1e9))
     end_speed = speed_at(speeds, s.stamp(end - 1), gap_ns)
     source = SpeedSource.AXIS
     if not math.isfinite(end_speed):
