@@ -76,7 +76,8 @@ def search(config: ChatterConfig, belief: Belief, p: Prepared, turned: Rotation,
         whole = spectrum(p.samples, p.rate, p.top)
         middle = overruled(whole, tooth_frequency, ratio_grid(config.nominal_band), belief.middle, config.axis_band)
         if loud(config, background, float(whole.power.sum())):
-            middle = told_by_strongest(whole, tooth_frequency, middle, config.band[0], config.nominal_band)
+            middle = told_by_strongest(whole, tooth_frequency, middle, config.band[0], config.nominal_band,
+                                       config.axis_band)
         belief = replace(belief, middle=middle)
     turns = float(turned.turns[-1] - turned.turns[0])
     told = min(config.nominal_band, PULL / (config.principal_teeth * turns))

@@ -166,16 +166,18 @@ def overruled(s: Spectrum, tooth_frequency: float, ratios: Array, held: float, b
     best = int(np.argmax(scores))
     near_held = float(scores[np.abs(ratios - held) <= band].max(initial=0.0))
     plain = int(np.sum(seen[best, :12] > math.log(PLAIN) / 2))
-    far = scores[best] > near_held + (9.0 if count > 1 else 5.0)
+    far = near_held < COMB_HELD and scores[best] > near_held + (9.0 if count > 1 else 5.0)
     return float(ratios[best]) if far and plain >= min(count, max(2, -(-min(count, 12) // 3))) else held
 
 
-def told_by_strongest(s: Spectrum, tooth_frequency: float, held: float, lowest: float, band: float) -> float:
+def told_by_strongest(s: Spectrum, tooth_frequency: float, held: float, lowest: float, band: float,
+                      near: float = 0.002) -> float:
     """Ratio of true to measured speed: `held`, or that which makes the strongest line a tooth or half-order harmonic.
 
-    A cut has a tooth passing comb. Where there is none at the held ratio (a tenth of the line energy at most), while
-    within +-band another ratio explains four fifths of it with harmonics k / 2 of tooth_frequency [Hz], k = 1 to 6 for
-    the strongest, the speed is another. Lines above `lowest` [Hz] count; s: of a window at a constant speed.
+    A cut has a tooth passing comb. Where there is none within +-near of the held ratio (NO_COMB of the line energy at
+    most), while within +-band another ratio explains four fifths of it with harmonics k / 2 of tooth_frequency [Hz],
+    k = 1 to 6 for the strongest, the speed is another. Lines above `lowest` [Hz] count; s: of a window at a constant
+    speed.
     """
     found = lines(s, lowest, PLAIN, 24)
     if not found:
@@ -187,12 +189,17 @@ def told_by_strongest(s: Spectrum, tooth_frequency: float, held: float, lowest: 
         away = np.abs(order - np.maximum(1, np.rint(order))) * ratio * tooth_frequency / 2
         return float(energy[away < 0.3 * s.resolution].sum() / energy.sum())
 
-    if explained(held) > 0.1:
+    if max(explained(held + part * near) for part in np.linspace(-1, 1, 17)) > NO_COMB:
         return held
     tried = [2 * frequency[0] / (k * tooth_frequency) for k in range(1, 7)]
     best = max((r for r in tried if abs(r - 1) <= band), key=explained, default=held)
     return float(best) if explained(best) > 0.8 else held
 
+
+NO_COMB = 0.03
+
+COMB_HELD = 10.0
+"""Score of two to three plain lines: a comb at the held ratio, which no other comb overrules."""
 
 PLAIN = 30.0
 """Power over floor from which a line speaks against the tachometer."""

@@ -7,7 +7,8 @@ is fitted through the values of successive periods:
 
 - synchronous amplitude: rms over the angle of the lines' values in the middle of the window, less
   their mean (the static deflection);
-- asynchronous amplitude: rms of the residuals about the lines;
+- asynchronous amplitude: rms of the residuals about the lines, and with an odd number of teeth of what repeats every
+  two revolutions but is no half-order line: chatter that has locked to the spindle, and no part of the synchronous one;
 - half-order amplitude: the part of the synchronous amplitude at odd multiples of half the tooth
   passing frequency (no value where tooth spacing is uneven);
 - chatter frequency: of the strongest line of the residuals (x and y together).
@@ -18,6 +19,7 @@ of equally spaced teeth, where half the tooth passing frequency is not a multipl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -119,8 +121,12 @@ def _amplitudes(window: Floats, length: int, half_order: int) -> tuple[float, fl
     asynchronous = np.sqrt(np.vdot(residual, residual) / (length * periods))
     half = 0.0
     if half_order:
-        lines = np.abs(np.fft.rfft(mean, axis=0)) ** 2 / length**2
-        half = float(np.sqrt(2 * np.sum(lines[half_order : length // 2 : 2 * half_order])))
+        lines = 2 * np.abs(np.fft.rfft(mean, axis=0)[: length // 2]) ** 2 / length**2
+        half = float(np.sqrt(np.sum(lines[half_order :: 2 * half_order])))
+        if length > MARKS_PER_TURN:
+            other = max(0.0, float(np.sum(lines[1::2])) - half**2)
+            asynchronous = np.hypot(asynchronous, math.sqrt(other))
+            synchronous = math.sqrt(max(0.0, synchronous**2 - other))
     middle = float(np.interp((len(window) - 1) / 2, np.arange(len(window)), window[:, 0]))
     rate = (len(window) - 1) / (window[-1, 0] - window[0, 0])
     return middle, float(synchronous), float(asynchronous), half, _strongest(residual.reshape(-1, 2)) * rate
