@@ -1,7 +1,7 @@
 """How probable it is that a verdict's state is right.
 
 A logistic map for each state: 1 / (1 + exp(-(b + w . e))), e the evidence below. Weights from
-tools/calibrate_confidence.py: 260 random cuts of the process simulator (1 to 6 teeth, 1200 to 18000 rpm,
+tools/calibrate_confidence.py: 280 random cuts of the process simulator (1 to 6 teeth, 1200 to 18000 rpm,
 up- and down-milling and slots, runout, noise, tones, tachometer up to 0.2 % wrong, depth held or ramped
 into chatter), each verdict held against the noise-free signal. On other machines and sensors the
 probabilities are as good as these cuts are like them; that they are calibrated is tested on cuts
@@ -22,13 +22,13 @@ EVIDENCE = ("1", "asynchronous", "half order", "near threshold", "noise", "comb"
             "change", "level")
 """Names of the evidence, in order; see :func:`evidence`."""
 
-_HALF_ORDER = (0.96, -1.29, -0.2, -1.26, -0.88, -0.59, 0.41, -0.22, -0.74, -0.81, -0.6)
+_HALF_ORDER = (4.02, -0.82, -0.0, 0.16, -0.13, 0.04, -0.11, -0.13, -0.32, -0.05, 0.08)
 
 WEIGHTS: dict[ChatterKind, tuple[float, ...]] = {
-    ChatterKind.AIR: (0.72, 0.21, -0.47, 1.5, 2.04, -1.02, -0.6, 0.17, -0.54, -0.42, -1.08),
-    ChatterKind.STABLE: (-3.16, -1.24, -0.75, 0.29, -1.3, -0.09, -0.15, 0.57, -0.6, -0.36, -0.72),
-    ChatterKind.MARGINAL: (4.47, 3.15, -0.83, -3.13, 0.53, 0.0, -0.03, 0.12, 0.2, -0.49, -0.41),
-    ChatterKind.HOPF: (1.27, 0.35, 0.19, -0.58, 0.48, 1.47, 1.53, 0.08, -0.16, -0.61, 1.05),
+    ChatterKind.AIR: (4.77, -0.84, 0.22, 0.01, 0.78, 0.0, -0.52, -0.2, -0.7, -0.08, -0.41),
+    ChatterKind.STABLE: (1.98, -0.86, -0.48, 0.16, -0.22, 0.04, -0.17, -0.2, -0.27, -0.1, 0.06),
+    ChatterKind.MARGINAL: (7.55, 2.03, -0.15, -2.14, 0.91, -0.35, 0.01, 0.07, -0.07, 0.02, -0.45),
+    ChatterKind.HOPF: (3.64, 1.11, -0.7, 0.27, 0.34, -0.35, -0.01, 0.01, -0.33, -0.01, 0.06),
     ChatterKind.FLIP: _HALF_ORDER,
     ChatterKind.FLIP_OR_RUNOUT: _HALF_ORDER,
 }
