@@ -61,6 +61,13 @@ def test_channels_that_could_not_hear_it_say_nothing(other: np.ndarray) -> None:
     assert first_alarm(heard(signal(0.5, 1), other)) == first_alarm(heard(signal(0.5, 1)))
 
 
+def test_a_small_other_line_does_not_hide_that_period_two_is_heard_twice() -> None:
+    turns = phase(SPEED, SECONDS)
+    one = comb(turns, 3) + 0.6 * flip(turns, 3, 1.0) + 0.1 * np.cos(2 * math.pi * 871.3 * np.arange(len(turns)) / RATE)
+    other = comb(turns, 3) + 0.3 * flip(turns, 3, 1.0) + noise(len(turns), 0.02, 2)
+    assert heard(one + noise(len(turns), 0.02, 1), other, teeth=3)[-1].state is ChatterKind.FLIP
+
+
 def test_period_two_is_confirmed_by_half_order_lines() -> None:
     turns = phase(SPEED, SECONDS)
     both = [comb(turns, 3) + size * flip(turns, 3, 1.0) + noise(len(turns), 0.02, k)

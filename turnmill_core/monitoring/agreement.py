@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.family import distance
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import Judgement
-from turnmill_core.monitoring.features import LINE_RATIO, Features, features
+from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import plain_comb
 from turnmill_core.monitoring.separation import prepare, resampled_turns
-from turnmill_core.monitoring.spectrum import Array
+from turnmill_core.monitoring.spectrum import LINE_RATIO, Array
 from turnmill_core.monitoring.speed import STEADY, Rotation
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 
@@ -42,12 +42,12 @@ class Agreement:
         return bool(self.deny) and not self.confirm
 
 
-def ask(f: Features, others: Iterable[tuple[str, Array]], rate: float, turned: Rotation, teeth: int,
+def ask(f: Features, kind: ChatterKind, others: Iterable[tuple[str, Array]], rate: float, turned: Rotation, teeth: int,
         band: tuple[float, float]) -> Agreement:
     """What other channels say of the chatter in a window's features.
 
-    f: of the judged channel, with a chatter family or, at an odd number of teeth, half-order lines; others: names and
-    samples (n,) of the same window at `rate` [Hz]; turned: the tool's rotation there; teeth: equal parts of a
+    f: of the judged channel; kind: HOPF, its chatter family is looked for, or FLIP, half-order lines are; others: names
+    and samples (n,) of the same window at `rate` [Hz]; turned: the tool's rotation there; teeth: equal parts of a
     revolution; band [Hz]: in which lines are judged.
     """
     confirm, deny = list[str](), list[str]()
@@ -55,7 +55,7 @@ def ask(f: Features, others: Iterable[tuple[str, Array]], rate: float, turned: R
         p = prepare(x, rate, band[1])
         turns = resampled_turns(turned.turns, len(p.samples), p.rate / rate)
         g = features(p, turns, turned.spread < STEADY, teeth, band[0], f.speed_ratio, (f.speed_ratio, f.speed_ratio))
-        same = _same(f, g, teeth)
+        same = _half_order(g) if kind is ChatterKind.FLIP else _family(f, g, teeth)
         if same > HEARD * (same + g.synchronous):
             confirm.append(name)
         elif same == 0.0 and plain_comb(g) and _audible(g, p.top - band[0]):
@@ -79,13 +79,18 @@ def with_others(judgement: Judgement, heard: Agreement) -> Judgement:
     return judgement
 
 
-def _same(f: Features, g: Features, teeth: int) -> float:
-    """Energy that features `g` hold of the chatter of `f`: its family, or half-order lines where it has none."""
+def _family(f: Features, g: Features, teeth: int) -> float:
+    """Energy that features `g` hold of the chatter family of `f`."""
     if f.chatter is None:
-        return g.own_half
+        return 0.0
     tooth, tolerance = teeth * f.frequency, 2 / f.seconds
     return sum(x.energy for x in g.lines if any(
-        _kernels.distance(x.frequency, m * f.chatter.frequency, tooth) <= tolerance for m in (1.0, 2.0, 3.0)))
+        distance(x.frequency, m * f.chatter.frequency, tooth) <= tolerance for m in (1.0, 2.0, 3.0)))
+
+
+def _half_order(g: Features) -> float:
+    """Energy of half-order lines in features `g`, none where noise may be all of it."""
+    return g.own_half if g.own_half > AUDIBLE * g.synchronous else 0.0
 
 
 def _audible(g: Features, width: float) -> bool:

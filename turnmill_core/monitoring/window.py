@@ -152,7 +152,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering or leaving)
     heard = Agreement()
     if not chattering and asked(config, judgement):
-        heard = ask(f, others, rate, turned, config.principal_teeth, config.band)
+        heard = ask(f, judgement.kind, others, rate, turned, config.principal_teeth, config.band)
         judgement = with_others(judgement, heard)
     fresh = judgement.kind is ChatterKind.HOPF and (outside or blank.window_start_ns < tracker.entered_ns)
     sure = risen > 1 or (bool(heard.confirm) and f.energy >= tracker.energy)
