@@ -220,12 +220,13 @@ def test_after_warming_nothing_is_compiled_while_the_machine_chatters() -> None:
     code = """
 import numpy as np
 from dataclasses import replace
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels import drift, family, resampling, sinusoids, spectrum, synchronous
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from tests.test_monitor_join import RATE, ROWS, axes, blocks, operation
 
 def compiled():
-    return {name: len(k.signatures) for name, k in vars(_kernels).items() if hasattr(k, "signatures")}
+    return {(m.__name__, name): len(k.signatures) for m in (drift, family, resampling, sinusoids, spectrum, synchronous)
+            for name, k in vars(m).items() if hasattr(k, "signatures")}
 
 op = operation()
 MonitorFeed(FeedSettings()).warm(op)

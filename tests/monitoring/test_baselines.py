@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.monitoring.signals import RATE, comb, hopf, noise, phase
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.synchronous import kalman_comb
 from turnmill_core.monitoring.baselines import (
     concentration,
     fft_energy_ratio,
@@ -31,13 +31,13 @@ def _fft(x: np.ndarray, turns: np.ndarray) -> float:
 def test_compiled_kalman_comb_does_what_its_plain_version_does() -> None:
     t = phase(3350 * 2 * math.pi / 60, 0.1)
     x = comb(t, 4) + noise(len(t), 0.1, 1)
-    assert np.allclose(_kernels.kalman_comb(x, t, 12, 0.003), _kernels.kalman_comb.py_func(x, t, 12, 0.003), atol=1e-9)
+    assert np.allclose(kalman_comb(x, t, 12, 0.003), kalman_comb.py_func(x, t, 12, 0.003), atol=1e-9)
 
 
 def test_kalman_comb_follows_a_harmonic_and_leaves_what_is_between() -> None:
     t = phase(3000 * 2 * math.pi / 60, 1.0)
     other = np.cos(2 * math.pi * 77.3 * np.arange(len(t)) / RATE)
-    left = _kernels.kalman_comb(np.cos(2 * math.pi * 3 * t) + other, t, 8, 0.003)
+    left = kalman_comb(np.cos(2 * math.pi * 3 * t) + other, t, 8, 0.003)
     assert np.std(left[-4000:] - other[-4000:]) < 0.15
 
 

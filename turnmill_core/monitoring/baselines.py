@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.synchronous import kalman_comb
 from turnmill_core.monitoring.spectrum import Array, spectrum
 
 LOWEST, TOP = 40.0, 5000.0
@@ -95,7 +95,7 @@ def kalman_energy_ratios(x: Array, turns: Array, rate: float, teeth: int, ends: 
     fastest = max(spindle / rate, float(np.max(np.diff(turns), initial=1e-9)))
     count = max(1, min(math.ceil(TOP / spindle), int(0.45 / fastest)))
     centred = x - float(np.mean(x))
-    left = _kernels.kalman_comb(centred, turns, count, min(spindle / rate / MEMORY, 0.5 / count))
+    left = kalman_comb(centred, turns, count, min(spindle / rate / MEMORY, 0.5 / count))
     end = np.clip(np.asarray(ends), 2, len(x)) - 2
     begin = np.maximum(0, end - length)
 

@@ -10,43 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.family import family_sums
+from turnmill_core.monitoring._kernels.synchronous import half_means
 from turnmill_core.monitoring.background import NO_BACKGROUND, Background
-from turnmill_core.monitoring.separation import (
-    LAYOUT,
-    Drift,
-    Layout,
-    Prepared,
-    Synchronous,
-    drift,
-    followed,
-    harmonic_noise,
-    lay_out,
-    sinusoids,
-    synchronous,
-    uniform_in_time,
-)
-from turnmill_core.monitoring.spectrum import Array, Line, Spectrum, lines, near, spectrum
-
-LINE_RATIO = 16.0
-"""A peak counts as a line above this power over the floor: noise alone passes it once in about 500 windows."""
-
-STRONG = 0.02
-"""Asynchronous lines above this share of the energy are taken out before the synchronous part is averaged."""
-
-
-PHASE = 0.004
-"""Drift of the first tooth passing harmonic over a window [revolutions of its phase] that is worth correcting."""
-
-LARGEST_RAMP = 0.01
-"""Largest relative change of the speed over a window that is followed by the signal alone."""
-
-
-COMB_SHARE = 0.05
-"""Share of the synchronous energy from which the tooth passing harmonics alone tell the speed.
-
-Else all spindle harmonics do, if there are four or more and none holds most of the energy, as a chatter line would.
-"""
+from turnmill_core.monitoring.following import Parts, follow
+from turnmill_core.monitoring.separation import Layout, Prepared, harmonic_noise, synchronous
+from turnmill_core.monitoring.spectrum import LINE_RATIO, Array, Line, Spectrum, lines, near
 
 CALM = 0.1
 """Asynchronous over synchronous energy below which nothing speaks against the speed."""
@@ -117,14 +86,6 @@ class Features:
     seconds: float = 0.0
 
 
-@dataclass(frozen=True)
-class _Parts:
-    layout: Layout
-    values: Array
-    one: Synchronous
-    residual: Spectrum
-
-
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
              band: tuple[float, float], wide: tuple[float, float] | None = None,
              background: Background = NO_BACKGROUND, apart: float = 0.0) -> Features:
@@ -136,9 +97,9 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     whose tones are no lines of the cut; apart [bins]: how far from a tooth passing harmonic a line must be (while a
     cut begins, its harmonics are wide).
     """
-    parts, ratio = _followed(p, turns, steady, teeth, lowest, ratio, band)
+    parts, ratio = follow(p, turns, steady, teeth, lowest, ratio, band)
     if wide is not None and parts.residual.power.sum() > CALM * parts.one.energy().sum():
-        other, at = _followed(p, turns, steady, teeth, lowest, ratio, wide)
+        other, at = follow(p, turns, steady, teeth, lowest, ratio, wide)
         if other.residual.power.sum() < 0.25 * parts.residual.power.sum():
             parts, ratio = other, at
     layout, found = parts.layout, parts.residual
@@ -172,71 +133,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     )
 
 
-def _separate(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float) -> _Parts:
-    """Synchronous part without the leakage of strong asynchronous lines, and the spectrum of what is left."""
-    layout = lay_out(p, turns, 1 if teeth % 2 == 0 else 2)
-    one = synchronous(layout, layout.values, 1)
-    residual = _residual(layout, one, p, steady)
-    least = STRONG * (residual.power.sum() + one.energy().sum())
-    harmonic = layout.frequency / (2 if teeth % 2 else 1)
-    strong = [x.frequency for x in lines(residual, lowest, 4 * LINE_RATIO, 6)
-              if x.energy > least and _distance(x.frequency / harmonic) * harmonic * layout.duration > 1]
-    if not strong:
-        return _Parts(layout, layout.values, one, residual)
-    values = layout.values - sinusoids(layout, layout.values, strong)
-    one = synchronous(layout, values, 1)
-    return _Parts(layout, values, one, _residual(layout, one, p, steady))
-
-
-def _residual(layout: Layout, one: Synchronous, p: Prepared, steady: bool) -> Spectrum:
-    values = layout.values - one.wave
-    if steady:
-        return spectrum(values, layout.points * layout.frequency, p.top)
-    return spectrum(*uniform_in_time(layout, values, LAYOUT * p.top), p.top)
-
-
-def _distance(x: float) -> float:
-    return abs(x - round(x))
-
-
-def _followed(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
-              band: tuple[float, float]) -> tuple[_Parts, float]:
-    """Separation at the speed, and with the ramp, that the tooth passing harmonics show; and the mean speed's ratio."""
-    assumed = turns * ratio
-    parts = _separate(p, assumed, steady, teeth, lowest)
-    length = parts.layout.revolutions
-    found = _drift(parts, p, teeth)
-    for _ in range(2):
-        error = float(np.clip(ratio * (1 + found.speed), *band)) / ratio - 1
-        if abs(error) * length * teeth < PHASE:
-            break
-        tried = followed(assumed, length, Drift(error))
-        better = _separate(p, tried, steady, teeth, lowest)
-        if better.residual.power.sum() > parts.residual.power.sum():
-            break
-        assumed, ratio, parts = tried, ratio * (1 + error), better
-        found = _drift(parts, p, teeth)
-    for _ in range(2):
-        ramp = min(LARGEST_RAMP / length, max(-LARGEST_RAMP / length, found.ramp))
-        if abs(ramp) * length**2 / 4 * teeth < PHASE:
-            break
-        assumed = followed(assumed, length, Drift(0.0, ramp))
-        better = _separate(p, assumed, False, teeth, lowest)
-        if better.residual.power.sum() > 0.9 * parts.residual.power.sum():
-            break
-        parts = better
-        found = _drift(parts, p, teeth)
-    return parts, ratio
-
-
-def _drift(parts: _Parts, p: Prepared, teeth: int) -> Drift:
-    noise = harmonic_noise(parts.residual, len(parts.one.mean), parts.layout.frequency, 1, parts.layout.duration)
-    last = min(len(parts.one.mean), int(p.top / parts.layout.frequency))
-    harmonics = _kernels.telling_harmonics(parts.one.mean, noise, last, teeth, COMB_SHARE)
-    return drift(parts.layout, parts.one, harmonics, noise[harmonics])
-
-
-def _half_odd(parts: _Parts, top: float, teeth: int) -> HalfOrder:
+def _half_odd(parts: Parts, top: float, teeth: int) -> HalfOrder:
     layout = parts.layout
     two = synchronous(layout, parts.values, 2)
     noise = harmonic_noise(parts.residual, len(two.mean), layout.frequency, 2, layout.duration)
@@ -252,11 +149,11 @@ def _half(frequencies: Array, energy: Array) -> HalfOrder:
     return HalfOrder(float(energy.sum()), float(frequencies[np.argmax(energy)]), tuple(frequencies[seen].tolist()))
 
 
-def _change(parts: _Parts, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
+def _change(parts: Parts, harmonics: NDArray[np.integer[Any]], noise: Array) -> float:
     """Amplitude of the harmonics in the second half of the window over the first; no less than the noise's."""
     table = parts.values.reshape(parts.layout.revolutions, parts.layout.points)
     least = 2 * float(noise[harmonics].sum())
-    amplitude = fft.rfft(_kernels.half_means(table))[:, harmonics] * (2 / parts.layout.points)
+    amplitude = fft.rfft(half_means(table))[:, harmonics] * (2 / parts.layout.points)
     early, late = ((amplitude.real**2 + amplitude.imag**2).sum(axis=1) / 2).tolist()
     return math.sqrt(max(late, least) / max(early, least)) if least > 0 else 1.0
 
@@ -273,7 +170,7 @@ def _merged(found: tuple[Line, ...], within: float) -> tuple[Line, ...]:
     return tuple(sorted(kept, key=lambda line: -line.energy))
 
 
-def _turning(parts: _Parts, clear: Array, noise: Array, tooth: NDArray[np.bool_],
+def _turning(parts: Parts, clear: Array, noise: Array, tooth: NDArray[np.bool_],
              lowest: float) -> tuple[tuple[Line, ...], NDArray[np.bool_]]:
     """Asynchronous lines so near to a spindle harmonic that the averaging took them in, and which harmonics they are.
 
@@ -309,11 +206,11 @@ def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
 
 def _beside_tooth(x: Line, tooth_frequency: float, apart: float) -> bool:
     """True within `apart` [Hz] of a tooth passing harmonic."""
-    return _distance(x.frequency / tooth_frequency) * tooth_frequency < apart
+    return abs(math.remainder(x.frequency / tooth_frequency, 1.0)) * tooth_frequency < apart
 
 
 def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> bool:
-    return _distance(frequency / tooth_frequency - 0.5) * tooth_frequency < 0.5 * s.resolution
+    return abs(math.remainder(frequency / tooth_frequency - 0.5, 1.0)) * tooth_frequency < 0.5 * s.resolution
 
 
 def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spindle_frequency: float,
@@ -329,8 +226,8 @@ def _chatter(s: Spectrum, found: tuple[Line, ...], tooth_frequency: float, spind
     tolerance, total = 1.2 * s.resolution, float(energy.sum())
     best: tuple[float, float, NDArray[np.bool_], float] | None = None
     for x in found[:CANDIDATES]:
-        own, multiples, explained = _kernels.family_sums(frequency, energy, x.frequency, tooth_frequency,
-                                                         spindle_frequency, tolerance)
+        own, multiples, explained = family_sums(frequency, energy, x.frequency, tooth_frequency, spindle_frequency,
+                                                tolerance)
         share = explained / total if total > 0 else 0.0
         if best is None or round(share, 1) > round(best[1], 1):
             best = x.frequency, share, own, multiples

@@ -19,7 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage, signal
 
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.drift import phase_drift
+from turnmill_core.monitoring._kernels.resampling import resampled, spline_at, spline_coefficients
+from turnmill_core.monitoring._kernels.sinusoids import normal_equations, waves
+from turnmill_core.monitoring._kernels.synchronous import between, harmonic_energy, row_fits
 from turnmill_core.monitoring.spectrum import Array, Spectrum
 
 LAYOUT = 2.5
@@ -48,8 +51,8 @@ def prepare(x: Array, rate: float, top: float) -> Prepared:
     top = min(top, 0.45 * rate)
     up, down = max(1, math.ceil(4 * top / rate)), max(1, int(rate / (4 * top)))
     taps = _low_pass(top / (rate * up), up)
-    samples = _kernels.resampled(x - x.mean(), taps, up, down)
-    return Prepared(samples, rate * up / down, top, _kernels.spline_coefficients(samples))
+    samples = resampled(x - x.mean(), taps, up, down)
+    return Prepared(samples, rate * up / down, top, spline_coefficients(samples))
 
 
 @lru_cache(maxsize=16)
@@ -105,8 +108,7 @@ def lay_out(p: Prepared, turns: Array, multiple: int) -> Layout:
         raise ValueError(f"window holds {total:.3g} revolutions, expected at least {3 * multiple}")
     frequency = total * p.rate / (len(turns) - 1)
     points = fft.next_fast_len(math.ceil(LAYOUT * p.top / frequency), real=True)
-    values, index = _kernels.spline_at(p.spline, turns, float(turns[-1] - revolutions), 1 / points,
-                                       revolutions * points)
+    values, index = spline_at(p.spline, turns, float(turns[-1] - revolutions), 1 / points, revolutions * points)
     return Layout(frequency, revolutions, points, values, index / p.rate)
 
 
@@ -129,14 +131,14 @@ class Synchronous:
 
     def energy(self) -> Array:
         """Mean square of every harmonic with its trend, in the weights of a Spectrum (Hann squared)."""
-        found: Array = _kernels.harmonic_energy(self.mean, self.trend, self.rows, self.period)
+        found: Array = harmonic_energy(self.mean, self.trend, self.rows, self.period)
         return found
 
 
 def synchronous(layout: Layout, values: Array, period: int) -> Synchronous:
     """Synchronous part of `values` (laid out like `layout`) over `period` revolutions, with linear trend."""
     table = values.reshape(layout.revolutions // period, period * layout.points)
-    fits, wave = _kernels.row_fits(table)
+    fits, wave = row_fits(table)
     mean, trend, bend = fft.rfft(fits) * (2 / (period * layout.points))
     return Synchronous(period, len(table), wave, mean, trend / period, bend / period**2)
 
@@ -148,8 +150,8 @@ def sinusoids(layout: Layout, values: Array, frequencies: Sequence[float]) -> Ar
     """
     if not frequencies:
         return np.zeros_like(values)
-    columns = _kernels.waves(layout.times, np.array(frequencies))
-    gram, right = _kernels.normal_equations(columns, values)
+    columns = waves(layout.times, np.array(frequencies))
+    gram, right = normal_equations(columns, values)
     gram[np.diag_indices(len(gram))] *= 1 + 1e-9
     found: Array = np.einsum("i,ij->j", np.linalg.solve(gram, right), columns)
     return found
@@ -175,7 +177,7 @@ def drift(layout: Layout, one: Synchronous, harmonics: NDArray[np.int64], noise:
     bend), then weighted medians over the harmonics above the noise, so that a line near one harmonic
     moves it little; noise: mean square that noise alone gives each. Zero without any such harmonic.
     """
-    return Drift(*_kernels.phase_drift(one.mean, one.trend, one.bend, harmonics, noise))
+    return Drift(*phase_drift(one.mean, one.trend, one.bend, harmonics, noise))
 
 
 def followed(turns: Array, revolutions: int, found: Drift) -> Array:
@@ -198,6 +200,6 @@ def harmonic_noise(floor: Spectrum, count: int, frequency: float, period: int, d
 
     count: number of harmonics, multiples of frequency / period [Hz]; duration [s] of the window.
     """
-    noise: Array = _kernels.between(floor.floor, frequency / (period * floor.step), count)
+    noise: Array = between(floor.floor, frequency / (period * floor.step), count)
     noise *= 1.5 / (floor.step * duration)
     return noise

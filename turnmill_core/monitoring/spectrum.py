@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
 
-from turnmill_core.monitoring import _kernels
+from turnmill_core.monitoring._kernels.spectrum import block_medians, largest_near, strongest_peaks, tapered
 
 Array = NDArray[np.float64]
 
 PAD = 2
 """Zero padding of every spectrum: bins per reciprocal window length."""
+
+LINE_RATIO = 16.0
+"""A peak counts as a line above this power over the floor: noise alone passes it once in about 500 windows."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +69,14 @@ def spectrum(x: Array, rate: float, top: float) -> Spectrum:
     count = fft.next_fast_len(PAD * len(x), real=True)
     step = rate / count
     keep = min(count // 2, int(top / step)) + 1
-    amplitude = fft.rfft(_kernels.tapered(x, w, count))[:keep]
+    amplitude = fft.rfft(tapered(x, w, count))[:keep]
     power = (amplitude.real**2 + amplitude.imag**2) * (2 / (count * squares))
     return Spectrum(rate / count, power, noise_floor(power, max(8, round(40 * count / len(x)))))
 
 
 def noise_floor(power: Array, block: int) -> Array:
     """Mean noise power per bin: medians over blocks of bins, over ln 2, joined by straight lines."""
-    floor: Array = _kernels.block_medians(power, block)
+    floor: Array = block_medians(power, block)
     return np.maximum(floor / math.log(2), sys.float_info.min)
 
 
@@ -83,7 +86,7 @@ def lines(s: Spectrum, lowest: float, ratio: float, most: int) -> tuple[Line, ..
     Frequency by a parabola through the logarithm of three bins (bias below 0.02 bins for Hann);
     energy from the main lobe, less the floor in it.
     """
-    bins, energy = _kernels.strongest_peaks(s.power, s.floor, math.ceil(lowest / s.step), ratio, most, 2 * PAD)
+    bins, energy = strongest_peaks(s.power, s.floor, math.ceil(lowest / s.step), ratio, most, 2 * PAD)
     return tuple(Line(peak(s, k), e, float(s.power[k] / s.floor[k]))
                  for k, e in zip(bins.tolist(), energy.tolist(), strict=True))
 
@@ -100,5 +103,5 @@ def peak(s: Spectrum, k: int) -> float:
 
 def near(values: Array, s: Spectrum, frequencies: Array, tolerance: float) -> Array:
     """Largest of `values` (one per bin) within `tolerance` [Hz] of each frequency; 0 outside the spectrum."""
-    found: Array = _kernels.largest_near(values, frequencies / s.step, max(0, round(tolerance / s.step)))
+    found: Array = largest_near(values, frequencies / s.step, max(0, round(tolerance / s.step)))
     return found
