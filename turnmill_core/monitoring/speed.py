@@ -32,7 +32,7 @@ PAGE = 64
 
 def remember(pages: Pages, item: SpindleSpeed) -> Pages:
     """Speeds in order of stamp with `item` (magnitude); left out: one not newer than the newest, or not finite."""
-    item = SpindleSpeed(item.stamp_ns, abs(item.speed))
+    item = SpindleSpeed(item.stamp_ns, abs(item.speed), item.angle)
     if not math.isfinite(item.speed) or (pages and item.stamp_ns <= pages[-1][-1].stamp_ns):
         return pages
     if pages and len(pages[-1]) < PAGE:
@@ -49,7 +49,8 @@ def held_until(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_ns: int) -
     """Speeds with the newest one held until an instant, where that is at most `longest_ns` later."""
     if not held or not 0 < stamp_ns - held[-1].stamp_ns <= longest_ns:
         return held
-    return (*held, SpindleSpeed(stamp_ns, held[-1].speed))
+    last = held[-1]
+    return (*held, SpindleSpeed(stamp_ns, last.speed, last.angle + last.speed * (stamp_ns - last.stamp_ns) * 1e-9))
 
 
 def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int) -> float:
