@@ -39,7 +39,7 @@ def test_every_parameter_is_described_and_every_number_bounded(probe: Probe, cls
 def test_the_monitors_settings_are_parameters_with_the_cores_defaults(probe: Probe) -> None:
     node, default = probe.add(ChatterMonitor), ChatterConfig(teeth=1)
     from_elsewhere = {"teeth", "nominal_speed", "equal_pitch", "expect_axes", "recorded_priors", "noise_floor",
-                      "sensors"}
+                      "sensors", "runout_share"}
     assert {field.name for field in fields(ChatterConfig)} == SETTINGS.keys() | from_elsewhere
     for name in SETTINGS:
         value = node.get_parameter(name).value
