@@ -12,7 +12,6 @@ from turnmill_core.monitoring.gate import loud, plain_comb
 from turnmill_core.monitoring.separation import Prepared
 from turnmill_core.monitoring.spectrum import Array, Spectrum, lines, spectrum
 from turnmill_core.monitoring.speed import (
-    STEADY,
     Rotation,
     best_ratio,
     comb_score,
@@ -26,6 +25,9 @@ SCORE_MEMORY = 0.9
 
 SURE = 5
 """Calm windows after which the ratio of true to measured speed is no longer sought far away."""
+
+NARROW = 1e-3
+"""Relative change of the speed in a window up to which the lines of its spectrum are narrow enough to tell it."""
 
 PULL = 0.3
 """Turn of the first tooth passing harmonic's phase over a window [revolutions] that still tells the speed's error."""
@@ -72,7 +74,7 @@ def search(config: ChatterConfig, belief: Belief, p: Prepared, turned: Rotation,
         scores = new if belief.scores is None else SCORE_MEMORY * belief.scores + (1 - SCORE_MEMORY) * new
         middle = best_ratio(grid, scores)[0]
         belief = replace(belief, scores=scores, ratio=middle, middle=middle)
-    elif far and turned.spread < STEADY:
+    elif far and turned.spread < NARROW:
         whole = spectrum(p.samples, p.rate, p.top)
         middle = overruled(whole, tooth_frequency, ratio_grid(config.nominal_band), belief.middle, config.axis_band)
         if loud(config, background, float(whole.power.sum())):
