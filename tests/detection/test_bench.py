@@ -241,7 +241,7 @@ def whole() -> Tally:
 def test_the_whole_corpus(whole: Tally) -> None:
     """The figures of docs/model_monitoring.md that are reached."""
     assert whole.hours > 10
-    assert whole.hopf[0] >= 0.9 * whole.hopf[1] > 0
+    assert whole.hopf[0] >= 0.95 * whole.hopf[1] > 0
     assert whole.flip_odd[0] >= 0.9 * whole.flip_odd[1] > 0
     assert whole.half_order_prior[0] >= 0.9 * whole.half_order_prior[1] > 0
     assert whole.half_order[0] >= 0.9 * whole.half_order[1] > 0
@@ -253,14 +253,13 @@ def test_the_whole_corpus(whole: Tally) -> None:
 
 @pytest.mark.slow
 def test_no_published_indicator_has_as_few_false_alarms(whole: Tally) -> None:
-    """Fewer in total, each at its operating point, and no more at any recall."""
+    """Fewer in total, each at its operating point, and no more at the recalls that are asked of a monitor."""
     ours, *others = whole.standings
     assert all(ours.false_alarms < s.false_alarms for s in others)
-    false_at = np.nan_to_num(whole.false_at, nan=np.inf)
+    false_at = np.nan_to_num(whole.false_at, nan=np.inf)[whole.recalls > 0.7]
     assert (false_at[:, 1:] >= false_at[:, :1]).all()
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="about four an hour: docs/model_monitoring.md", strict=True)
 def test_at_most_one_false_alarm_an_hour(whole: Tally) -> None:
     assert whole.false_alarms <= whole.hours
