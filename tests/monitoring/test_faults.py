@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.monitoring.signals import RATE, blocks, by_stamp, comb, noise, phase, speeds, watch
+from tests.monitoring.signals import RATE, blocks, by_stamp, comb, hopf, noise, phase, speeds, watch
 from turnmill_core.monitoring.blocks import SensorBlock, Status
 from turnmill_core.monitoring.chatter import ChatterConfig, RecordedPrior, finish, initial, update
 from turnmill_core.monitoring.verdict import ChatterKind, Reason, Verdict
@@ -194,3 +194,18 @@ def test_memory_is_bounded() -> None:
             sizes.append(held + sum(map(len, state.speeds)) / 25)
     assert max(sizes) < 250
     assert state.streams[0].blocks[0].first_sample > state.streams[0].end - 3 * RATE
+
+
+def test_what_one_channel_hears_in_air_is_not_held_against_another() -> None:
+    """A channel of another scale takes over: its chatter is far below the first one's noise out of the cut."""
+    speed, seconds = 3350 * 2 * math.pi / 60, 4.0
+    turns = phase(speed, seconds)
+    at = np.arange(len(turns)) / RATE
+    x = (at > 1.0) * comb(turns, 4) + (at > 2.5) * hopf(turns, 4, 871.3, 0.6)
+    first = np.where(at < 2.0, x + noise(len(turns), 0.1, 1), 0.0)
+    second = 1e-6 * (x + noise(len(turns), 0.02, 2))
+    config = ChatterConfig(teeth=4, nominal_speed=speed, fallback=True)
+    table = np.stack([first, second], axis=1)
+    verdicts = watch(config, by_stamp(list(blocks(table)), list(speeds(speed, seconds))))
+    assert verdicts[-1].channel == "ch1"
+    assert verdicts[-1].state is ChatterKind.HOPF

@@ -54,6 +54,8 @@ def test_the_newest_speed_is_held_for_a_moment() -> None:
     held = (SpindleSpeed(0, 100.0, 0.0), SpindleSpeed(10, 101.0, 1.0))
     assert held_until(held, 10, 5) is held
     assert held_until(held, 14, 5) == (*held, SpindleSpeed(14, 101.0, 1.0 + 101.0 * 4e-9))
+    back = (SpindleSpeed(0, 100.0, 1.0), SpindleSpeed(10, 101.0, 0.0))
+    assert held_until(back, 14, 5)[-1].angle == -101.0 * 4e-9
     assert held_until(held, 16, 5) is held
     assert held_until((), 16, 5) == ()
 

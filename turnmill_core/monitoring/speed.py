@@ -50,7 +50,8 @@ def held_until(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_ns: int) -
     if not held or not 0 < stamp_ns - held[-1].stamp_ns <= longest_ns:
         return held
     last = held[-1]
-    return (*held, SpindleSpeed(stamp_ns, last.speed, last.angle + last.speed * (stamp_ns - last.stamp_ns) * 1e-9))
+    turned = math.copysign(last.speed, last.angle - held[-2].angle) if len(held) > 1 else last.speed
+    return (*held, SpindleSpeed(stamp_ns, last.speed, last.angle + turned * (stamp_ns - last.stamp_ns) * 1e-9))
 
 
 def speed_at(held: tuple[SpindleSpeed, ...], stamp_ns: int, longest_gap_ns: int) -> float:

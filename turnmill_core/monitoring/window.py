@@ -60,17 +60,29 @@ APART = 1.3
 class Tracker:
     """What is carried from window to window of one device.
 
-    Held state; background; belief of the speed; history: strongest families of the last windows; runout: of the shank,
-    as fibre probes see it; entered_ns: end of the window with which the cut began; energy: of the newest window.
+    Held state; channel that is judged and its background; set_aside: backgrounds of channels that were judged before,
+    by name; belief of the speed; history: strongest families of the last windows; runout: of the shank, as fibre probes
+    see it; entered_ns: end of the window with which the cut began; energy: of the newest window.
     """
 
     held: Held = field(default_factory=Held)
+    channel: str = ""
     background: Background = field(default_factory=Background)
+    set_aside: tuple[tuple[str, Background], ...] = ()
     belief: Belief = field(default_factory=Belief)
     history: tuple[Seen, ...] = ()
     runout: ShankRunout = field(default_factory=ShankRunout)
     entered_ns: int = LONG_AGO_NS
     energy: float = 0.0
+
+    def on(self, channel: str) -> Tracker:
+        """Tracker that judges a channel: with its own background, and nothing else that depends on its scale."""
+        if channel == self.channel:
+            return self
+        known = {**dict(self.set_aside), self.channel: self.background}
+        background = known.pop(channel, Background())
+        return replace(self, channel=channel, background=background, set_aside=tuple(known.items()), history=(),
+                       energy=0.0)
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -117,8 +129,8 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
     if turned.spread > LARGEST_SPREAD:
         return _unknown(tracker, blank, Reason.SPEED_CHANGING,
                         f"the spindle speed differs by up to {100 * turned.spread:.0f} % from its mean")
-    tracker, verdict = _judge_samples(config, tracker, replace(blank, spindle_speed_source=source), x, s.sample_rate,
-                                      turned, prior, others(s, start, end, name))
+    tracker, verdict = _judge_samples(config, tracker.on(name), replace(blank, spindle_speed_source=source), x,
+                                      s.sample_rate, turned, prior, others(s, start, end, name))
     if seen is not None and verdict.state is ChatterKind.AIR and verdict.reason is not Reason.PERSISTENCE:
         runout = learned(tracker.runout, seen)
         new = runout.known and not tracker.runout.known
@@ -166,7 +178,8 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
-    return Tracker(held, background, after(belief, f), history, tracker.runout, entered, f.energy), verdict
+    return replace(tracker, held=held, background=background, belief=after(belief, f), history=history,
+                   entered_ns=entered, energy=f.energy), verdict
 
 
 def _doubles(x: Array) -> bool:
