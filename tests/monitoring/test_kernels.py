@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage, signal
 
-from turnmill_core.monitoring._kernels import drift, family, resampling, sinusoids, spectrum, synchronous
+from turnmill_core.monitoring._kernels import drift, family, lattice, resampling, sinusoids, spectrum, synchronous
 
 RNG = np.random.default_rng(3)
 
@@ -69,6 +69,32 @@ def test_strongest_peaks_take_their_lobes() -> None:
         assert energy == pytest.approx([69.5 + 7.5 + 5 * 0.5, 59.5 + 49.5 + 5 * 0.5])
         assert kernel(power, floor, 0, 16.0, 1, 3)[0].tolist() == [3]
         assert len(kernel(power, floor, 41, 16.0, 9, 3)[0]) == 0
+
+
+def test_side_lobes_of_a_hann_window_are_no_peaks() -> None:
+    count, pad = 2000, 2
+    t = np.arange(count) / count
+    x = np.cos(2 * math.pi * 200.3 * t) + 3e-3 * np.cos(2 * math.pi * 208.3 * t)
+    power = np.abs(np.fft.rfft(np.hanning(count) * x, pad * count)) ** 2
+    for kernel in (spectrum.strongest_peaks, spectrum.strongest_peaks.py_func):
+        bins, _ = kernel(power, np.full(len(power), 1e-12), 5, 16.0, 9, 2 * pad)
+        assert (bins / pad).tolist() == pytest.approx([200.3, 208.3], abs=0.3)
+
+
+def test_lattice_evidence_is_the_likelihood_of_lines() -> None:
+    ratios, spread = np.array([0.99, 1.0, 1.02]), np.full(2, 0.5)
+    for kernel in (lattice.lattice_evidence, lattice.lattice_evidence.py_func):
+        one = kernel(np.array([200.3]), spread[:1], 100.0, ratios, 0.1, True, 5.0)
+        away = np.array([200.3 - 198.0, 0.3, 204.0 - 200.3]) / 0.5
+        density = 0.9 * ratios * 100.0 * np.exp(-0.5 * away**2) / (0.5 * math.sqrt(2 * math.pi))
+        assert one == pytest.approx(np.log(np.maximum(density, 0.1)))
+        two = kernel(np.array([237.0, 337.2]), spread, 100.0, ratios, 0.1, False, 5.0)
+        sigma = 0.5 * math.sqrt(2)
+        joins = 0.9 * 0.5 * 100.0 * math.exp(-0.5 * (0.2 / sigma) ** 2) / (sigma * math.sqrt(2 * math.pi))
+        assert two[1] == pytest.approx(math.log(0.1) + math.log(joins))
+        assert two[0] == two[2] == pytest.approx(2 * math.log(0.1))
+        mirrored = kernel(np.array([237.0, 163.0]), spread, 100.0, ratios, 0.1, False, 5.0)
+        assert mirrored[1] > 0 > kernel(np.array([237.0, 163.0]), spread, 100.0, ratios, 0.1, False, 3.0)[1]
 
 
 def test_row_fits_are_least_squares() -> None:

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from tests.monitoring.signals import RATE, blocks, by_stamp, noise, phase, speeds, watch
+from tests.monitoring.signals import RATE, blocks, by_stamp, comb, hopf, noise, phase, speeds, watch
 from turnmill_core.monitoring.chatter import ChatterConfig
-from turnmill_core.monitoring.spectrum import spectrum
-from turnmill_core.monitoring.speed import SpindleSpeed, held_until, told_by_strongest
+from turnmill_core.monitoring.lattice import MOST, evidence, measured_prior, trial_ratios
+from turnmill_core.monitoring.spectrum import LINE_RATIO, lines, spectrum
+from turnmill_core.monitoring.speed import SpindleSpeed, held_until
 from turnmill_core.monitoring.verdict import ChatterKind, SpeedSource
 
 SPEED = 8000 * 2 * math.pi / 60
@@ -18,24 +19,44 @@ TEETH = 5
 TOOTH = TEETH * SPEED / (2 * math.pi)
 
 
-def told(*lines: tuple[float, float], measured: float = 1.0) -> float:
+def told(*given: tuple[float, float], measured: float = 1.0, seed: int = 1) -> float:
     """Ratio told by lines (order of the true tooth passing frequency, amplitude); tachometer `measured` times true."""
     t = np.arange(round(0.2 * RATE)) / RATE
-    x = sum(a * np.cos(2 * math.pi * order * TOOTH * t + order) for order, a in lines) + noise(len(t), 1e-3, 1)
-    return told_by_strongest(spectrum(x, RATE, 5000.0), TOOTH * measured, 1.0, 40.0, 0.02)
+    x = sum(a * np.cos(2 * math.pi * order * TOOTH * t + order) for order, a in given) + noise(len(t), 1e-3, seed)
+    s, ratios = spectrum(x, RATE, 5000.0), trial_ratios(0.02)
+    scores = evidence(lines(s, 40.0, LINE_RATIO, MOST), s.resolution, TOOTH * measured, TEETH, ratios)
+    return float(ratios[np.argmax(scores + measured_prior(ratios))])
+
+
+COMB = tuple((float(k), 1.0 / k) for k in range(1, 6))
+FAMILY = tuple((abs(k + 0.37), a) for k, a in ((3, 1.0), (4, 0.5), (2, 0.3), (-2, 0.1), (-3, 0.05)))
+HALF_ORDER = tuple((k + 0.5, 1.0 / (1 + k)) for k in range(4))
+RUNOUT = tuple((k / TEETH, 0.1) for k in range(1, 10))
+
+
+@pytest.mark.parametrize("measured", [0.985, 0.99, 0.998, 1.0, 1.01, 1.015])
+@pytest.mark.parametrize("given", [COMB, FAMILY, (*COMB, *FAMILY), HALF_ORDER, RUNOUT, COMB[:2]])
+def test_the_spacing_of_lines_tells_the_speed(given: tuple[tuple[float, float], ...], measured: float) -> None:
+    """Stable or not, with a comb or without one."""
+    assert told(*given, measured=measured) == pytest.approx(1 / measured, rel=4e-4)
 
 
 @pytest.mark.parametrize("measured", [0.985, 0.99, 1.01, 1.015])
-@pytest.mark.parametrize("order", [0.5, 1.0, 1.5, 2.0])
-def test_a_single_line_near_a_low_harmonic_tells_the_speed(order: float, measured: float) -> None:
-    assert told((order, 1.0), measured=measured) == pytest.approx(1 / measured, rel=1e-3)
+def test_a_single_line_near_a_harmonic_tells_the_speed(measured: float) -> None:
+    assert told((1.0, 1.0), measured=measured) == pytest.approx(1 / measured, rel=1e-3)
+    assert told((2.0, 1.0), measured=measured) == pytest.approx(1 / measured, rel=1e-3)
 
 
-def test_other_lines_than_harmonics_tell_nothing() -> None:
-    assert told((1.37, 1.0)) == 1.0
-    assert told((2.02, 1.0), (2.0, 0.5)) == 1.0
-    assert told((1.01, 1.0), (1.37, 0.9), (2.37, 0.9)) == 1.0
+def test_chatter_is_no_reason_to_doubt_a_right_tachometer() -> None:
+    """No strong family pulls the comb onto itself, wherever it lies."""
+    for offset in np.linspace(0.03, 0.47, 23):
+        family = tuple((k + offset, a) for k, a in ((4, 1.0), (5, 0.3), (3, 0.3), (6, 0.1)))
+        assert told(*family, (1.0, 0.01), (2.0, 0.01)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_noise_and_single_lines_elsewhere_tell_nothing() -> None:
     assert told() == 1.0
+    assert told((1.37, 1.0)) == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("error", [-0.01, 0.01])
@@ -48,6 +69,23 @@ def test_one_harmonic_at_a_wrong_tachometer_is_no_chatter(error: float) -> None:
     late = [v for v in verdicts if v.window_end_ns > 1.3e9]
     assert {v.state for v in late} == {ChatterKind.STABLE}
     assert late[-1].spindle_speed == pytest.approx(SPEED, rel=1e-3)
+
+
+@pytest.mark.parametrize("error", [-0.01, 0.01])
+@pytest.mark.parametrize("chatter", [0.0, 2.0])
+def test_a_wrong_tachometer_is_found_while_the_speed_ramps(chatter: float, error: float) -> None:
+    """500 rpm a second, from the first window of a cut on."""
+    seconds = 3.0
+    speed = (3000 + 500 * np.arange(round(seconds * RATE)) / RATE) * 2 * math.pi / 60
+    turns = phase(speed, seconds)
+    cut = np.arange(len(turns)) / RATE > 1.0
+    x = cut * (comb(turns, TEETH, harmonics=6) + hopf(turns, TEETH, 871.3, chatter)) + noise(len(turns), 2e-2, 2)
+    config = ChatterConfig(teeth=TEETH, nominal_speed=float(speed[0]))
+    verdicts = watch(config, by_stamp(list(blocks(x)), list(speeds(speed * (1 + error), seconds))))
+    late = [v for v in verdicts if v.window_end_ns > 1.4e9]
+    assert {v.state for v in late} == {ChatterKind.HOPF if chatter else ChatterKind.STABLE}
+    middle = late[-1].window_end_ns * 1e-9 - 0.1
+    assert late[-1].spindle_speed == pytest.approx((3000 + 500 * middle) * 2 * math.pi / 60, rel=1e-3)
 
 
 def test_the_newest_speed_is_held_for_a_moment() -> None:

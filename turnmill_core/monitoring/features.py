@@ -17,9 +17,6 @@ from turnmill_core.monitoring.following import Parts, follow
 from turnmill_core.monitoring.separation import Layout, Prepared, harmonic_noise, synchronous
 from turnmill_core.monitoring.spectrum import LINE_RATIO, Array, Line, Spectrum, lines, near
 
-CALM = 0.1
-"""Asynchronous over synchronous energy below which nothing speaks against the speed."""
-
 CANDIDATES = 4
 """Strongest lines that are tried as H."""
 
@@ -87,21 +84,15 @@ class Features:
 
 
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
-             band: tuple[float, float], wide: tuple[float, float] | None = None,
-             background: Background = NO_BACKGROUND, apart: float = 0.0) -> Features:
+             band: tuple[float, float], background: Background = NO_BACKGROUND, apart: float = 0.0) -> Features:
     """Features of a window.
 
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
-    [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; wide: further
-    band in which another speed is taken where it leaves a quarter of the asynchronous energy or less; background:
-    whose tones are no lines of the cut; apart [bins]: how far from a tooth passing harmonic a line must be (while a
-    cut begins, its harmonics are wide).
+    [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; background: whose
+    tones are no lines of the cut; apart [bins]: how far from a tooth passing harmonic a line must be (while a cut
+    begins, its harmonics are wide).
     """
     parts, ratio = follow(p, turns, steady, teeth, lowest, ratio, band)
-    if wide is not None and parts.residual.power.sum() > CALM * parts.one.energy().sum():
-        other, at = follow(p, turns, steady, teeth, lowest, ratio, wide)
-        if other.residual.power.sum() < 0.25 * parts.residual.power.sum():
-            parts, ratio = other, at
     layout, found = parts.layout, parts.residual
     tooth_frequency = teeth * layout.frequency
     noise = harmonic_noise(found, len(parts.one.mean), layout.frequency, 1, layout.duration)

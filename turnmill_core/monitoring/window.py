@@ -11,7 +11,7 @@ import numpy as np
 from turnmill_core.monitoring import stream as streams
 from turnmill_core.monitoring.agreement import Agreement, ask, asked, with_others
 from turnmill_core.monitoring.background import Background
-from turnmill_core.monitoring.belief import Belief, after, search
+from turnmill_core.monitoring.belief import Belief, after, refinement, search
 from turnmill_core.monitoring.channel import choose, others
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
@@ -149,13 +149,14 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     turns = constant_rotation(turned.mean, len(p.samples), p.rate).turns if steady else resampled_turns(
         turned.turns, len(p.samples), p.rate / rate)
     grid_index = (blank.last_sample + 1) // max(1, round(config.hop * rate))
-    far = not tracker.belief.sure and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)
-    belief, sought = search(config, tracker.belief, p, turned, blank.spindle_speed_source is not SpeedSource.NOMINAL,
-                            far, tracker.background)
+    measured, belief = blank.spindle_speed_source is not SpeedSource.NOMINAL, tracker.belief
+    if not measured or (not belief.sure and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)):
+        belief = search(config, belief, p, turns, measured, tracker.background)
+    ratio, band = refinement(config, belief)
     outside, chattering = tracker.held.kind in OUTSIDE, tracker.held.kind in CHATTER
     young = outside or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
-    f = features(p, turns, steady, config.principal_teeth, config.band[0], sought.ratio, sought.band, sought.wide,
-                 tracker.background, APART if young else 0.0)
+    f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, tracker.background,
+                 APART if young else 0.0)
     cut = in_cut(config, f, tracker.background, chattering)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
     risen = rise(history, f.seconds, f.chatter is not None and f.chatter.sidebands > 0)

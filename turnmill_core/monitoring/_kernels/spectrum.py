@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -79,7 +81,8 @@ def strongest_peaks(power: Floats, floor: Floats, lowest: int, ratio: float, mos
     """Bins of the `most` strongest peaks of `power` (n,) from bin `lowest` on and above `ratio` times the floor (n,).
 
     Strongest first, each with its energy: what its main lobe, `lobe` bins on either side, holds above the floor and no
-    stronger peak has taken. A peak in the lobe of a stronger one is part of it.
+    stronger peak has taken. A peak in the main lobe of a stronger one is part of it, and so is one of less than four
+    times what the side lobes of a Hann window have there.
     """
     at = np.empty(len(power), dtype=np.int64)
     count = 0
@@ -103,6 +106,10 @@ def strongest_peaks(power: Floats, floor: Floats, lowest: int, ratio: float, mos
             if not taken[k]:
                 total += power[k] - floor[k]
                 taken[k] = True
+        for i in range(count):
+            away = 2.0 * abs(at[i] - best) / lobe
+            if away > 2.0 and power[at[i]] < 4.0 * power[best] / (math.pi * away * (away * away - 1.0)) ** 2:
+                at[i] = best
         bins[found], energy[found] = best, max(total, 0.0)
         found += 1
     return bins[:found], energy[:found]
