@@ -44,7 +44,7 @@ def trial_ratios(band: float) -> Array:
 
 
 def evidence(found: Sequence[Line], resolution: float, tooth_frequency: float, teeth: int, ratios: Array) -> Array:
-    """Log-likelihood of each trial ratio (m,) of true to assumed tooth passing frequency [Hz]: (m,).
+    """Log-likelihood of each trial ratio (m,) of true to assumed tooth_frequency [Hz]: (m,).
 
     found: lines, strongest first, of a spectrum of `resolution` [Hz]; teeth: equal parts of a revolution. The step is
     the tooth passing or the spindle frequency, equally probable; of the latter only the spacing of lines counts, as its

@@ -27,8 +27,8 @@ def lattice_evidence(frequency: Floats, spread: Floats, step: float, ratios: Flo
     places, members, width = np.zeros((3, 2 * len(frequency) + 1))
     for m in range(len(ratios)):
         spacing = ratios[m] * step
-        count, total = 1, 1.0
-        members[0] = 1.0 if comb else 0.0
+        count, total = 1, 1.0 if comb else 0.0
+        members[0] = total
         for k in range(len(frequency)):
             order = frequency[k] / spacing
             best, joined = math.log(alone), -1
