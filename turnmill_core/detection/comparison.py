@@ -35,7 +35,7 @@ class Standing:
     threshold (NaN: our states) and its source; false_alarms, and without the gate (ours has its own); false_share:
     share of the time without chatter that is spent in false alarms; hopf, flip_odd: (found, episodes), in time; area:
     under the ROC curve of windows; delays: of every ramp, alarm after the 20 % crossing [s] (NaN: none);
-    before_tripled: ramps with the alarm before the amplitude has tripled; cpu: per second of signal.
+    before_tripled: ramps with the alarm before the amplitude has tripled, if it ever does; cpu: per second of signal.
     """
 
     name: str
@@ -158,7 +158,7 @@ def _standing(found: Sequence[Heard], name: str, operating: tuple[float, str], o
         name, *operating, len(false), len(false) if ungated is None else ungated,
         sum(b + 1 - a for a, b in false) / quiet if quiet else math.nan,
         (sum(in_time(h, by[id(h)]) for h in hopf), len(hopf)), (sum(in_time(h, by[id(h)]) for h in odd), len(odd)),
-        area, tuple(d for d, _ in delays), sum(d <= tripled for d, tripled in delays), cpu)
+        area, tuple(d for d, _ in delays), sum(math.isfinite(d) and not d > tripled for d, tripled in delays), cpu)
 
 
 def roc_area(chatter: ArrayLike, score: ArrayLike) -> float:

@@ -82,7 +82,7 @@ def go_on(motion: Motion, kind: str, number: int, part: int, seconds: float = SE
     others = noisy_others(f"{kind} {number} {part}", {n: x for n, x in clean.items() if n != name}, levels,
                           turns)
     return Observed(CHANNELS[name], (clean[name] + noise).astype(np.float32), others, turns, speeds, join_truth(()),
-                    join_truth(()), float(noise.std()))
+                    (), float(noise.std()))
 
 
 def _along(wave: Floats, turns: Floats) -> Floats:

@@ -47,8 +47,9 @@ makes audible."""
 TACHOMETER_HZ = 250.0
 TRUTH_HOP = 0.03
 TOP = 5000.0
-LASTING = 0.2
-"""Length of the windows of the lasting truth [s]."""
+LASTING = (0.2, 1.0)
+"""Lengths of the windows of the lasting truth [s]: a line that turns a hundredth of a revolution each revolution passes
+for synchronous in a short one."""
 SURE, NOT = 0.25, 0.12
 """Asynchronous (or half-order) over synchronous amplitude from which a window is chatter, and below which it is not;
 the threshold of 0.2 lies between."""
@@ -102,7 +103,8 @@ class Observed:
     """What a monitor gets: the judged channel's samples (n,), the others' (n, 2) and spindle speeds; and what not.
 
     turns (n,): true revolutions of the tool at the samples; truth: of the channel without noise; lasting: the same over
-    longer windows, in which lines close to a spindle harmonic show too; noise: rms of all noise, in the channel's unit.
+    longer windows (see LASTING), in which lines close to a spindle harmonic show too; noise: rms of all noise, in the
+    channel's unit.
     """
 
     channel: Channel
@@ -111,7 +113,7 @@ class Observed:
     turns: Floats
     speeds: tuple[SpindleSpeed, ...]
     truth: Truth
-    lasting: Truth
+    lasting: tuple[Truth, ...]
     noise: float
 
     def blocks(self, size: int = 256) -> list[SensorBlock]:
@@ -148,7 +150,8 @@ def observe(motion: Motion, extra_error: float = 0.0) -> Observed:
     levels = {n: float(values[count // 2:].std()) for n, values in rest.items()}
     others = noisy_others(f"{cut.kind} {cut.number}", rest, levels, turns)
     per_second = op.conditions.tool_speed / (2 * math.pi * principal_turns(op.tool))
-    lasting = channel_truth(op.tool, motion.truth, clean, turns, max(PERIODS, round(LASTING * per_second)))
+    lasting = tuple(channel_truth(op.tool, motion.truth, clean, turns, max(PERIODS, round(seconds * per_second)))
+                    for seconds in LASTING)
     return Observed(CHANNELS[name], (clean + noise).astype(np.float32), others, turns, speeds, truth, lasting,
                     float(noise.std()))
 
@@ -217,10 +220,10 @@ def coloured(rng: np.random.Generator, count: int, corner: float) -> Floats:
     return found
 
 
-def _lasts(lasting: Truth, at: float) -> bool:
-    """True where the truth over longer windows is not sure that there is no chatter at a time [s]."""
-    with np.errstate(invalid="ignore"):
-        return bool(len(lasting.time) and lasting.ratio[np.argmin(np.abs(lasting.time - at))] > NOT)
+def _lasts(lasting: Truth, seconds: float, at: float) -> bool:
+    """True where the truth over windows of `seconds` [s] is not sure that there is no chatter at a time [s]."""
+    near = np.flatnonzero((np.abs(lasting.time - at) <= seconds / 2) & np.isfinite(lasting.ratio))
+    return bool(len(near) and lasting.ratio[near[np.argmin(np.abs(lasting.time[near] - at))]] > NOT)
 
 
 @dataclass(frozen=True)
@@ -277,7 +280,8 @@ def true_kinds(cut: Cut, seen: Observed, verdicts: Sequence[Verdict]) -> list[Ch
         else:
             kinds = {true_kind(cut, a, h) for a, h in zip(truth.ratio[at], half[at], strict=True)}
             kind = kinds.pop() if len(kinds) == 1 else None
-            found.append(None if kind is ChatterKind.STABLE and _lasts(seen.lasting, (begin + end) / 2) else kind)
+            lasts = any(_lasts(x, t, (begin + end) / 2) for x, t in zip(seen.lasting, LASTING, strict=True))
+            found.append(None if kind is ChatterKind.STABLE and lasts else kind)
     return found
 
 

@@ -22,7 +22,8 @@ WARNING = 0.5
 LEAST = 0.25
 """Share, over the one at which chatter begins, from which its growth is believed."""
 
-CHATTER = (ChatterKind.HOPF, ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT)
+ALARMS = (ChatterKind.HOPF, ChatterKind.FLIP)
+CHATTER = (*ALARMS, ChatterKind.FLIP_OR_RUNOUT)
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,13 @@ class Judgement:
     half_order_ratio: float = math.nan
 
 
-def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, chattering: bool,
-          prior: Prior | None, warning: float = math.inf, risen: float = 1.0, entering: bool = False) -> Judgement:
+def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, held: ChatterKind,
+          prior: Prior | None, warning: float = math.inf, risen: float = 1.0, unsteady: bool = False) -> Judgement:
     """State of a window from its features.
 
-    chattering: the leave thresholds apply instead of the enter thresholds; warning [s]: time in which a
+    held: state so far; the leave thresholds apply to it, the enter thresholds to others; warning [s]: time in which a
     growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
-    entering: out of the cut before, and the signal at least doubles within the window; or it has fallen since the last.
+    unsteady: out of the cut before, and the signal at least doubles within the window; or it has fallen since the last.
     """
     asynchronous = sum(x.energy for x in f.lines)
     total = asynchronous + f.synchronous + f.own_half
@@ -55,21 +56,22 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     if not cut:
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
                          ratio, half)
-    kind, reason, text = _cut(config, f, ratio, half, chattering, prior, risen)
+    kind, reason, text = _cut(config, f, ratio, half, held, prior, risen)
     if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
         kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
         text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
-    changing = not chattering and plain_comb(f) and abs(math.log(f.change)) > TRANSIENT
-    if kind is not ChatterKind.STABLE and (changing or entering):
+    begins = held not in CHATTER or (held not in ALARMS and kind is ChatterKind.HOPF)
+    changing = plain_comb(f) and abs(math.log(f.change)) > TRANSIENT
+    if kind is not ChatterKind.STABLE and begins and (changing or unsteady):
         kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
         what = f"the tooth passing harmonics change {f.change:.2g}-fold" if changing else "the signal grows or falls"
         text = f"entry or exit: {what}; else {text}"
     return Judgement(kind, reason, text, ratio, half)
 
 
-def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, chattering: bool, prior: Prior | None,
+def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, held: ChatterKind, prior: Prior | None,
          risen: float) -> tuple[ChatterKind, Reason, str]:
-    threshold = config.leave_ratio if chattering else config.enter_ratio
+    threshold = config.leave_ratio if held in ALARMS else config.enter_ratio
     c = f.chatter
     if c is not None:
         share = c.energy / (c.energy + f.synchronous + f.own_half)
@@ -85,7 +87,7 @@ def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, chatteri
         if evident and share > config.leave_ratio:
             return (ChatterKind.MARGINAL, Reason.ASYNCHRONOUS,
                     f"lines at {c.frequency:.1f} Hz hold {100 * share:.1f} % of the energy")
-    if half > threshold and _dominates(config, f):
+    if half > (config.leave_ratio if held in CHATTER else config.enter_ratio) and _dominates(config, f):
         return half_order(config, half, prior)
     return ChatterKind.STABLE, Reason.SYNCHRONOUS, f"{100 * (1 - ratio):.1f} % of the energy is synchronous"
 

@@ -15,7 +15,7 @@ from turnmill_core.monitoring.belief import Belief, after, refinement, search
 from turnmill_core.monitoring.channel import choose, others
 from turnmill_core.monitoring.confidence import confidence, evidence
 from turnmill_core.monitoring.config import ChatterConfig
-from turnmill_core.monitoring.decision import CHATTER, Held, Judgement, judge, persist, windows_to_enter
+from turnmill_core.monitoring.decision import ALARMS, CHATTER, Held, Judgement, judge, persist, windows_to_enter
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import in_cut, learn, plain_comb
 from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
@@ -153,18 +153,17 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     if not measured or (not belief.sure and (tracker.held.kind not in CHATTER or grid_index % LOOK_EVERY == 0)):
         belief = search(config, belief, p, turns, measured, tracker.background)
     ratio, band = refinement(config, belief)
-    outside, chattering = tracker.held.kind in OUTSIDE, tracker.held.kind in CHATTER
+    outside = tracker.held.kind in OUTSIDE
     young = outside or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
     f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, tracker.background,
                  APART if young else 0.0)
-    cut = in_cut(config, f, tracker.background, chattering)
+    cut = in_cut(config, f, tracker.background, tracker.held.kind in CHATTER)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
     risen = rise(history, f.seconds, f.chatter is not None and f.chatter.sidebands > 0)
-    entering = outside and _doubles(p.samples)
-    leaving = not chattering and f.energy < FALLING * tracker.energy
-    judgement = judge(config, f, tracker.background, cut, chattering, prior, warning, risen, entering or leaving)
+    unsteady = (outside and _doubles(p.samples)) or f.energy < FALLING * tracker.energy
+    judgement = judge(config, f, tracker.background, cut, tracker.held.kind, prior, warning, risen, unsteady)
     heard = Agreement()
-    if not chattering and asked(config, judgement):
+    if tracker.held.kind not in ALARMS and asked(config, judgement):
         heard = ask(f, judgement.kind, others, rate, turned, config.principal_teeth, config.band)
         judgement = with_others(judgement, heard)
     fresh = judgement.kind is ChatterKind.HOPF and (outside or blank.window_start_ns < tracker.entered_ns)
