@@ -89,10 +89,29 @@ def test_steel_at_a_quarter_immersion_is_stable_and_its_speed_certain(recordings
     assert np.median(found) == pytest.approx(peak(part, rate, 390, 410) / 8, rel=1e-3)
 
 
-def test_steel_at_full_immersion_chatters_at_its_ends(recordings: Path) -> None:
-    """Between them the signal is synchronous to 0.97 at the true speed (2998.4 rpm): no chatter is said there."""
-    x, rate = acceleration(recordings, "T100", 1)
+@pytest.mark.parametrize(("column", "longest"), [(1, 0), (2, 4)])
+def test_steel_at_full_immersion_is_synchronous(recordings: Path, column: int, longest: int) -> None:
+    """Feed and cross direction: at the true speed less than a tenth of the energy is not the spindle's.
+
+    Chatter was expected there. Between entry and exit nothing is said but for 0.15 s in the cross direction.
+    """
+    x, rate = acceleration(recordings, "T100", column)
     config = ChatterConfig(teeth=4, nominal_speed=3000 * 2 * math.pi / 60, expect_axes=False)
     verdicts = watch(config, list(blocks(x, rate, size=32)))
-    assert [v for v in verdicts if v.state is ChatterKind.HOPF]
-    assert not [v for v in verdicts if v.state in CHATTER and 3e9 < v.window_end_ns < 12e9]
+    assert len([v for v in verdicts if v.state in CHATTER and 1e9 < v.window_end_ns < 13e9]) <= longest
+    speed = np.median([v.spindle_speed for v in verdicts if v.state is ChatterKind.STABLE]) / (2 * math.pi)
+    part = x[round(2 * rate): round(12 * rate)]
+    windows = part[: len(part) // 330 * 330].reshape(-1, 330)
+    t = np.arange(330) / rate
+    orders = 2 * math.pi * speed * np.arange(1, int(rate / 2 / speed))
+    basis = np.concatenate([np.cos(np.outer(t, orders)), np.sin(np.outer(t, orders)), np.ones((330, 1))], axis=1)
+    left = windows.T - basis @ np.linalg.lstsq(basis, windows.T, rcond=None)[0]
+    assert np.median(np.var(left, axis=0) / np.var(windows, axis=1)) < 0.1
+
+
+def test_steel_along_the_tool_axis_at_a_quarter_immersion_is_folded_and_no_chatter(recordings: Path) -> None:
+    """Its strongest line is the 13th tooth passing harmonic, folded by the rate of 1651 Hz to 703 Hz."""
+    x, rate = acceleration(recordings, "T25", 3)
+    config = ChatterConfig(teeth=4, nominal_speed=3000 * 2 * math.pi / 60, expect_axes=False)
+    verdicts = watch(config, list(blocks(x, rate, size=32)))
+    assert not [v for v in verdicts if v.state is ChatterKind.HOPF and 1.5e9 < v.window_end_ns < 12.5e9]

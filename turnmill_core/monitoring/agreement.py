@@ -14,13 +14,17 @@ from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import Judgement
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import plain_comb
+from turnmill_core.monitoring.growth import Surge
 from turnmill_core.monitoring.separation import prepare, resampled_turns
-from turnmill_core.monitoring.spectrum import LINE_RATIO, Array
+from turnmill_core.monitoring.spectrum import LINE_RATIO, Array, Line
 from turnmill_core.monitoring.speed import STEADY, Rotation
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 
 HEARD = 0.01
 """Share of its own and the synchronous energy that chatter must have in a channel that confirms it."""
+
+GROWN = 2.0
+"""Energy at the end of a window over the mean one there from which a line grows."""
 
 AUDIBLE = 1e-3
 """Share that a channel must be able to tell from its noise, or its silence says nothing."""
@@ -42,20 +46,23 @@ class Agreement:
         return bool(self.deny) and not self.confirm
 
 
-def ask(f: Features, kind: ChatterKind, others: Iterable[tuple[str, Array]], rate: float, turned: Rotation, teeth: int,
-        band: tuple[float, float]) -> Agreement:
+def ask(f: Features, kind: ChatterKind, surge: Surge | None, others: Iterable[tuple[str, Array]], rate: float,
+        turned: Rotation, teeth: int, band: tuple[float, float]) -> Agreement:
     """What other channels say of the chatter in a window's features.
 
-    f: of the judged channel; kind: HOPF, its chatter family is looked for, or FLIP, half-order lines are; others: names
-    and samples (n,) of the same window at `rate` [Hz]; turned: the tool's rotation there; teeth: equal parts of a
-    revolution; band [Hz]: in which lines are judged.
+    f: of the judged channel; kind: HOPF, its chatter family is looked for, or FLIP, half-order lines are; surge: line
+    that grows at the end of the window, if that is all there is; others: names and samples (n,) of the same window at
+    `rate` [Hz]; turned: the tool's rotation there; teeth: equal parts of a revolution; band [Hz]: in which lines are
+    judged.
     """
     confirm, deny = list[str](), list[str]()
     for name, x in others:
         p = prepare(x, rate, band[1])
         turns = resampled_turns(turned.turns, len(p.samples), p.rate / rate)
-        g = features(p, turns, turned.spread < STEADY, teeth, band[0], f.speed_ratio, (f.speed_ratio, f.speed_ratio))
-        same = _half_order(g) if kind is ChatterKind.FLIP else _family(f, g, teeth)
+        g = features(p, turns, turned.spread < STEADY, teeth, band[0], f.speed_ratio, (f.speed_ratio, f.speed_ratio),
+                     surges=surge is not None)
+        same = _half_order(g) if kind is ChatterKind.FLIP else _family(f, g, teeth) if surge is None else _grown(
+            surge.frequency, g)
         if same > HEARD * (same + g.synchronous):
             confirm.append(name)
         elif same == 0.0 and plain_comb(g) and _audible(g, p.top - band[0]):
@@ -69,7 +76,9 @@ def asked(config: ChatterConfig, judgement: Judgement) -> bool:
 
 
 def with_others(judgement: Judgement, heard: Agreement) -> Judgement:
-    """Judgement of the window after the other channels have been asked."""
+    """Judgement of the window after the other channels have been asked: a faint one needs one that confirms it."""
+    if judgement.faint and not heard.confirm:
+        return replace(judgement, kind=ChatterKind.MARGINAL, text=f"{judgement.text}; no other channel confirms it")
     if heard.denied:
         names = ", ".join(heard.deny)
         return replace(judgement, kind=ChatterKind.MARGINAL, reason=Reason.DENIED,
@@ -86,6 +95,15 @@ def _family(f: Features, g: Features, teeth: int) -> float:
     tooth, tolerance = teeth * f.frequency, 2 / f.seconds
     return sum(x.energy for x in g.lines if any(
         distance(x.frequency, m * f.chatter.frequency, tooth) <= tolerance for m in (1.0, 2.0, 3.0)))
+
+
+def _grown(frequency: float, g: Features) -> float:
+    """Energy at the end of the window of a line near a frequency [Hz] in features `g`, if it is GROWN there."""
+    def nearby(found: tuple[Line, ...]) -> float:
+        return max((x.energy for x in found if abs(x.frequency - frequency) < 2 / g.seconds), default=0.0)
+
+    end = nearby(g.rising)
+    return end if end > GROWN * nearby(g.lines) else 0.0
 
 
 def _half_order(g: Features) -> float:

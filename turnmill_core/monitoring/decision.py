@@ -9,6 +9,7 @@ from turnmill_core.monitoring.background import Background
 from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.features import Features
 from turnmill_core.monitoring.gate import plain_comb
+from turnmill_core.monitoring.growth import Surge
 from turnmill_core.monitoring.half_order import half_order
 from turnmill_core.monitoring.verdict import ChatterKind, Reason
 from turnmill_core.prediction import Prior
@@ -19,8 +20,14 @@ TRANSIENT = math.log(2.0)
 WARNING = 0.5
 """A family that will pass the enter threshold in less than this [s] makes the cut marginal."""
 
-LEAST = 0.25
-"""Share, over the one at which chatter begins, from which its growth is believed."""
+BELIEVED = 0.25
+"""Share, over the one at which chatter begins, from which the growth of a family over several windows is believed."""
+
+EVIDENT = 0.1
+"""Energy of a family over that of the noise from which it needs no other channel to confirm it."""
+
+SEEN_TO_SURGE = 2
+"""Windows in a row over which a line must surge where no other channel confirms it."""
 
 ALARMS = (ChatterKind.HOPF, ChatterKind.FLIP)
 CHATTER = (*ALARMS, ChatterKind.FLIP_OR_RUNOUT)
@@ -30,7 +37,8 @@ CHATTER = (*ALARMS, ChatterKind.FLIP_OR_RUNOUT)
 class Judgement:
     """State of one window by itself, and what it rests on.
 
-    asynchronous_ratio, half_order_ratio [1], NaN where not computed; confidence, 0 to 1.
+    asynchronous_ratio, half_order_ratio [1], NaN where not computed; surges: it rests on a line that grows at the
+    end of the window; faint: another channel must confirm it.
     """
 
     kind: ChatterKind
@@ -38,15 +46,19 @@ class Judgement:
     text: str
     asynchronous_ratio: float = math.nan
     half_order_ratio: float = math.nan
+    surges: bool = False
+    faint: bool = False
 
 
 def judge(config: ChatterConfig, f: Features, background: Background, cut: bool, held: ChatterKind,
-          prior: Prior | None, warning: float = math.inf, risen: float = 1.0, unsteady: bool = False) -> Judgement:
+          prior: Prior | None, warning: float = math.inf, risen: float = 1.0,
+          surge: Surge | None = None, unsteady: bool = False) -> Judgement:
     """State of a window from its features.
 
     held: state so far; the leave thresholds apply to it, the enter thresholds to others; warning [s]: time in which a
     growing family will pass the enter threshold; risen: its energy at the end of the window over its mean there;
-    unsteady: out of the cut before, and the signal at least doubles within the window; or it has fallen since the last.
+    surge: line that will pass it before the next window ends; unsteady: out of the cut before, and the signal at least
+    doubles within the window; or it has fallen since the last.
     """
     asynchronous = sum(x.energy for x in f.lines)
     total = asynchronous + f.synchronous + f.own_half
@@ -56,7 +68,12 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
     if not cut:
         return Judgement(ChatterKind.AIR, Reason.BELOW_NOISE, "no tooth passing comb stands out of the noise",
                          ratio, half)
-    kind, reason, text = _cut(config, f, ratio, half, held, prior, risen)
+    kind, reason, text, faint = _cut(config, f, ratio, half, held, prior, risen)
+    surges = kind in (ChatterKind.STABLE, ChatterKind.MARGINAL) and surge is not None
+    if surge is not None and surges:
+        kind, reason, faint = ChatterKind.HOPF, Reason.ASYNCHRONOUS, surge.windows < SEEN_TO_SURGE
+        text = (f"a line at {surge.frequency:.1f} Hz surges: {100 * surge.share:.1f} % of the energy at the end of the "
+                f"window, {surge.growth:.1f} times as much as one window before")
     if kind is ChatterKind.STABLE and warning < WARNING and f.chatter is not None:
         kind, reason = ChatterKind.MARGINAL, Reason.ASYNCHRONOUS
         text = f"lines at {f.chatter.frequency:.1f} Hz grow exponentially: chatter in {warning:.1f} s if they go on"
@@ -66,30 +83,32 @@ def judge(config: ChatterConfig, f: Features, background: Background, cut: bool,
         kind, reason = ChatterKind.STABLE, Reason.TRANSIENT
         what = f"the tooth passing harmonics change {f.change:.2g}-fold" if changing else "the signal grows or falls"
         text = f"entry or exit: {what}; else {text}"
-    return Judgement(kind, reason, text, ratio, half)
+    hopf = kind is ChatterKind.HOPF
+    return Judgement(kind, reason, text, ratio, half, surges and hopf, faint and hopf)
 
 
 def _cut(config: ChatterConfig, f: Features, ratio: float, half: float, held: ChatterKind, prior: Prior | None,
-         risen: float) -> tuple[ChatterKind, Reason, str]:
+         risen: float) -> tuple[ChatterKind, Reason, str, bool]:
+    """State of a window in the cut, reason, text, and whether another channel must confirm it."""
     threshold = config.leave_ratio if held in ALARMS else config.enter_ratio
     c = f.chatter
     if c is not None:
         share = c.energy / (c.energy + f.synchronous + f.own_half)
-        evident = c.explained > 0.5 and c.energy > 0.1 * f.noise
+        spans, evident = c.explained > 0.5, c.energy > EVIDENT * f.noise
+        if spans and share > threshold and (evident or held not in ALARMS):
+            text = (f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.principal_teeth:.1f} Hz hold "
+                    f"{100 * share:.0f} % of the energy" + ("" if evident else ", faint in the noise"))
+            return ChatterKind.HOPF, Reason.ASYNCHRONOUS, text, not evident
         now = risen * c.energy / (risen * c.energy + f.synchronous + f.own_half)
-        if evident and config.enter_ratio * LEAST < share < threshold < now:
+        if spans and evident and config.enter_ratio * BELIEVED < share < threshold < now:
             return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
-                    f"lines at {c.frequency:.1f} Hz grow exponentially to {100 * now:.0f} % of the energy")
-        if evident and share > threshold:
-            return (ChatterKind.HOPF, Reason.ASYNCHRONOUS,
-                    f"lines at {c.frequency:.1f} Hz + i {f.frequency * config.principal_teeth:.1f} Hz hold "
-                    f"{100 * share:.0f} % of the energy")
-        if evident and share > config.leave_ratio:
+                    f"lines at {c.frequency:.1f} Hz grow exponentially to {100 * now:.0f} % of the energy", False)
+        if spans and evident and share > config.leave_ratio:
             return (ChatterKind.MARGINAL, Reason.ASYNCHRONOUS,
-                    f"lines at {c.frequency:.1f} Hz hold {100 * share:.1f} % of the energy")
+                    f"lines at {c.frequency:.1f} Hz hold {100 * share:.1f} % of the energy", False)
     if half > (config.leave_ratio if held in CHATTER else config.enter_ratio) and _dominates(config, f):
-        return half_order(config, half, prior)
-    return ChatterKind.STABLE, Reason.SYNCHRONOUS, f"{100 * (1 - ratio):.1f} % of the energy is synchronous"
+        return *half_order(config, half, prior), False
+    return ChatterKind.STABLE, Reason.SYNCHRONOUS, f"{100 * (1 - ratio):.1f} % of the energy is synchronous", False
 
 
 def _dominates(config: ChatterConfig, f: Features) -> bool:

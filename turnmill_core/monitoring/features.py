@@ -13,12 +13,18 @@ from scipy import fft
 from turnmill_core.monitoring._kernels.family import family_sums
 from turnmill_core.monitoring._kernels.synchronous import half_means
 from turnmill_core.monitoring.background import NO_BACKGROUND, Background
-from turnmill_core.monitoring.following import Parts, follow
+from turnmill_core.monitoring.following import Parts, follow, residual
 from turnmill_core.monitoring.separation import Layout, Prepared, harmonic_noise, synchronous
 from turnmill_core.monitoring.spectrum import LINE_RATIO, Array, Line, Spectrum, lines, near
 
 CANDIDATES = 4
 """Strongest lines that are tried as H."""
+
+MOST_RISING, BESIDE = 8, 3.0
+"""Lines looked at at the end of a window; how far [bins] from a tooth passing harmonic, which is wide there."""
+
+FOLDS = 2
+"""Multiple of the sample rate up to which tooth passing harmonics may be folded into the band."""
 
 TURNING = 0.008
 """A line that turns faster than this against the tool [revolutions of phase per revolution] is asynchronous."""
@@ -63,7 +69,8 @@ class Features:
     energy; energy: all energy in the band; change: amplitude of the tooth passing harmonics in the
     second half of the window over the first; lines: asynchronous lines, strongest first; chatter: the
     family that explains most of them, if any; own_half: energy of half-order lines that are not among the
-    spindle harmonics; seconds: length of the window [s].
+    spindle harmonics; seconds: length of the window [s]; rising: asynchronous lines as they are at the end of the
+    window (empty where not asked for).
     """
 
     frequency: float
@@ -81,16 +88,18 @@ class Features:
     chatter: ChatterFamily | None
     own_half: float = 0.0
     seconds: float = 0.0
+    rising: tuple[Line, ...] = ()
 
 
 def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float, ratio: float,
-             band: tuple[float, float], background: Background = NO_BACKGROUND, apart: float = 0.0) -> Features:
+             band: tuple[float, float], background: Background = NO_BACKGROUND, apart: float = 0.0,
+             surges: bool = False) -> Features:
     """Features of a window.
 
     turns: revolutions per sample at the assumed speed; steady: True for a constant speed; lowest
     [Hz]: lower end of the band; ratio: expected true over assumed speed, refined within `band`; background: whose
     tones are no lines of the cut; apart [bins]: how far from a tooth passing harmonic a line must be (while a cut
-    begins, its harmonics are wide).
+    begins, its harmonics are wide); surges: look at the lines at the end of the window, too.
     """
     parts, ratio = follow(p, turns, steady, teeth, lowest, ratio, band)
     layout, found = parts.layout, parts.residual
@@ -106,7 +115,8 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     first = np.flatnonzero(tooth & inside)[:12]
     asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear)
                          and not _beside_tooth(x, tooth_frequency, apart * found.resolution))
-    asynchronous = tuple(x for x in _merged((*asynchronous, *turning), found.resolution) if not background.holds(x))
+    asynchronous = tuple(x for x in _merged((*asynchronous, *turning), found.resolution) if not background.holds(x)
+                         and not _is_folded(x, tooth_frequency, p.sampled, found.resolution))
     if teeth % 2:
         half = _half_odd(parts, p.top, teeth)
         asynchronous = tuple(x for x in asynchronous if not _is_half_order(x.frequency, tooth_frequency, found))
@@ -120,8 +130,18 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
         float(found.power[low:].sum() + energy[inside].sum()), _change(parts, np.flatnonzero(tooth & inside), noise),
         asynchronous,
         _chatter(found, asynchronous, tooth_frequency, layout.frequency, lowest), half.energy if teeth % 2 else 0.0,
-        layout.duration,
+        layout.duration, _rising(parts, p, steady, lowest, tooth_frequency, clear, background) if surges else (),
     )
+
+
+def _rising(parts: Parts, p: Prepared, steady: bool, lowest: float, tooth_frequency: float, clear: Array,
+            background: Background) -> tuple[Line, ...]:
+    """Asynchronous lines seen through a window that rises to its end; none beside a tooth passing harmonic."""
+    end = residual(parts.layout, parts.one, p, steady, rising=True)
+    return tuple(x for x in lines(end, lowest, LINE_RATIO, MOST_RISING)
+                 if not _is_skirt(x, end, parts.layout, clear) and not background.holds(x)
+                 and not _beside_tooth(x, tooth_frequency, BESIDE * end.resolution)
+                 and not _is_folded(x, tooth_frequency, p.sampled, end.resolution))
 
 
 def _half_odd(parts: Parts, top: float, teeth: int) -> HalfOrder:
@@ -198,6 +218,18 @@ def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
 def _beside_tooth(x: Line, tooth_frequency: float, apart: float) -> bool:
     """True within `apart` [Hz] of a tooth passing harmonic."""
     return abs(math.remainder(x.frequency / tooth_frequency, 1.0)) * tooth_frequency < apart
+
+
+def _is_folded(x: Line, tooth_frequency: float, sampled: float, within: float) -> bool:
+    """True where a tooth passing harmonic beyond half the rate `sampled` [Hz], but below twice the rate, is folded to.
+
+    A sensor that limits the band by its rate may have no filter against it. Within half of `within` [Hz].
+    """
+    if not sampled:
+        return False
+    beyond = np.arange(math.ceil(sampled / 2 / tooth_frequency), math.ceil(FOLDS * sampled / tooth_frequency))
+    at = beyond * tooth_frequency
+    return bool((np.abs(np.abs(at - np.rint(at / sampled) * sampled) - x.frequency) < 0.5 * within).any())
 
 
 def _is_half_order(frequency: float, tooth_frequency: float, s: Spectrum) -> bool:

@@ -92,23 +92,27 @@ def _separate(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float
     """Synchronous part without the leakage of strong asynchronous lines, and the spectrum of what is left."""
     layout = lay_out(p, turns, 1 if teeth % 2 == 0 else 2)
     one = synchronous(layout, layout.values, 1)
-    residual = _residual(layout, one, p, steady)
-    least = STRONG * (residual.power.sum() + one.energy().sum())
+    left = residual(layout, one, p, steady)
+    least = STRONG * (left.power.sum() + one.energy().sum())
     harmonic = layout.frequency / (2 if teeth % 2 else 1)
-    strong = [x.frequency for x in lines(residual, lowest, 4 * LINE_RATIO, 6)
+    strong = [x.frequency for x in lines(left, lowest, 4 * LINE_RATIO, 6)
               if x.energy > least and abs(math.remainder(x.frequency / harmonic, 1.0)) * harmonic * layout.duration > 1]
     if not strong:
-        return Parts(layout, layout.values, one, residual)
+        return Parts(layout, layout.values, one, left)
     values = layout.values - sinusoids(layout, layout.values, strong)
     one = synchronous(layout, values, 1)
-    return Parts(layout, values, one, _residual(layout, one, p, steady))
+    return Parts(layout, values, one, residual(layout, one, p, steady))
 
 
-def _residual(layout: Layout, one: Synchronous, p: Prepared, steady: bool) -> Spectrum:
+def residual(layout: Layout, one: Synchronous, p: Prepared, steady: bool, rising: bool = False) -> Spectrum:
+    """Spectrum of what a synchronous part leaves of its window.
+
+    steady: True for a constant speed; rising: through a window that grows to its end.
+    """
     values = layout.values - one.wave
     if steady:
-        return spectrum(values, layout.points * layout.frequency, p.top)
-    return spectrum(*uniform_in_time(layout, values, LAYOUT * p.top), p.top)
+        return spectrum(values, layout.points * layout.frequency, p.top, rising)
+    return spectrum(*uniform_in_time(layout, values, LAYOUT * p.top), p.top, rising)
 
 
 def _drift(parts: Parts, p: Prepared, teeth: int) -> Drift:

@@ -33,13 +33,15 @@ LAYOUT = 2.5
 class Prepared:
     """Window at a rate suited to the band.
 
-    samples (mean removed), rate [Hz], top of the band [Hz]; spline: coefficients of the cubic spline through them.
+    samples (mean removed), rate [Hz], top of the band [Hz]; spline: coefficients of the cubic spline through them;
+    sampled [Hz]: rate at which the sensor was, where that limits the band (0: it does not).
     """
 
     samples: Array
     rate: float
     top: float
     spline: Array
+    sampled: float = 0.0
 
 
 def prepare(x: Array, rate: float, top: float) -> Prepared:
@@ -48,11 +50,11 @@ def prepare(x: Array, rate: float, top: float) -> Prepared:
     top [Hz]: highest judged frequency, at most 0.45 rate. Four samples a period let cubic splines
     interpolate; the low-pass (flat to `top`, 50 dB down from 1.5 top) lets the layout be coarser.
     """
-    top = min(top, 0.45 * rate)
+    sampled, top = rate if top > 0.45 * rate else 0.0, min(top, 0.45 * rate)
     up, down = max(1, math.ceil(4 * top / rate)), max(1, int(rate / (4 * top)))
     taps = _low_pass(top / (rate * up), up)
     samples = resampled(x - x.mean(), taps, up, down)
-    return Prepared(samples, rate * up / down, top, spline_coefficients(samples))
+    return Prepared(samples, rate * up / down, top, spline_coefficients(samples), sampled)
 
 
 @lru_cache(maxsize=16)

@@ -22,6 +22,10 @@ LINE_RATIO = 16.0
 """A peak counts as a line above this power over the floor: noise alone passes it once in about 500 windows."""
 
 
+SURGE, CUT = 12.0, 4e-3
+"""Growth [1/s] and end [s] of a window for lines that grow: chatter may triple within a tenth of a second."""
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """One-sided power spectrum of a Hann window.
@@ -63,9 +67,21 @@ def _hann(count: int) -> tuple[Array, float]:
     return w, float(np.sum(w**2))
 
 
-def spectrum(x: Array, rate: float, top: float) -> Spectrum:
-    """Power spectrum of `x` (samples at `rate` Hz, mean removed) from 0 to `top` [Hz]."""
-    w, squares = _hann(len(x))
+@lru_cache(maxsize=32)
+def _rising(count: int, rate: float) -> tuple[Array, float]:
+    """Window that grows as exp(SURGE t) and falls to zero in its last CUT, and the sum of its squares."""
+    before_end = (np.arange(count) - count + 0.5) / rate
+    w = np.exp(SURGE * before_end) * np.sin(np.minimum(1.0, -before_end / CUT) * math.pi / 2) ** 2
+    w.flags.writeable = False
+    return w, float(np.sum(w**2))
+
+
+def spectrum(x: Array, rate: float, top: float, rising: bool = False) -> Spectrum:
+    """Power spectrum of `x` (samples at `rate` Hz, mean removed) from 0 to `top` [Hz].
+
+    rising: seen through a window that grows exponentially to the end of `x`, matched to a line that does so.
+    """
+    w, squares = _rising(len(x), rate) if rising else _hann(len(x))
     count = fft.next_fast_len(PAD * len(x), real=True)
     step = rate / count
     keep = min(count // 2, int(top / step)) + 1

@@ -18,7 +18,7 @@ from turnmill_core.monitoring.config import ChatterConfig
 from turnmill_core.monitoring.decision import ALARMS, CHATTER, Held, Judgement, judge, persist, windows_to_enter
 from turnmill_core.monitoring.features import Features, features
 from turnmill_core.monitoring.gate import in_cut, learn, plain_comb
-from turnmill_core.monitoring.growth import Seen, remember, rise, time_to
+from turnmill_core.monitoring.growth import Seen, Surge, remember, rise, surges, surging, time_to
 from turnmill_core.monitoring.separation import prepare, resampled_turns
 from turnmill_core.monitoring.spectrum import Array, spectrum
 from turnmill_core.monitoring.speed import (
@@ -62,7 +62,8 @@ class Tracker:
 
     Held state; channel that is judged and its background; set_aside: backgrounds of channels that were judged before,
     by name; belief of the speed; history: strongest families of the last windows; runout: of the shank, as fibre probes
-    see it; entered_ns: end of the window with which the cut began; energy: of the newest window.
+    see it; entered_ns: end of the window with which the cut began; energy: of the newest window;
+    rising: lines at its end.
     """
 
     held: Held = field(default_factory=Held)
@@ -74,6 +75,7 @@ class Tracker:
     runout: ShankRunout = field(default_factory=ShankRunout)
     entered_ns: int = LONG_AGO_NS
     energy: float = 0.0
+    rising: tuple[Surge, ...] = ()
 
     def on(self, channel: str) -> Tracker:
         """Tracker that judges a channel: with its own background, and nothing else that depends on its scale."""
@@ -82,7 +84,7 @@ class Tracker:
         known = {**dict(self.set_aside), self.channel: self.background}
         background = known.pop(channel, Background())
         return replace(self, channel=channel, background=background, set_aside=tuple(known.items()), history=(),
-                       energy=0.0)
+                       energy=0.0, rising=())
 
 
 def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, speeds: tuple[SpindleSpeed, ...],
@@ -139,7 +141,7 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
 
 
 def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tuple[Tracker, Verdict]:
-    return replace(tracker, held=Held(), history=()), replace(blank, reason=reason, reason_text=text)
+    return replace(tracker, held=Held(), history=(), rising=()), replace(blank, reason=reason, reason_text=text)
 
 
 def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
@@ -155,19 +157,23 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     ratio, band = refinement(config, belief)
     outside = tracker.held.kind in OUTSIDE
     young = outside or blank.window_end_ns < tracker.entered_ns + YOUNG_NS
+    alarmed = tracker.held.kind in ALARMS
     f = features(p, turns, steady, config.principal_teeth, config.band[0], ratio, band, tracker.background,
-                 APART if young else 0.0)
+                 APART if young else 0.0, surges=not alarmed and not outside)
     cut = in_cut(config, f, tracker.background, tracker.held.kind in CHATTER)
     history, warning = _growth(config, tracker.history, f, blank.window_end_ns)
-    risen = rise(history, f.seconds, f.chatter is not None and f.chatter.sidebands > 0)
+    risen = rise(history, f.seconds) if f.chatter is not None and f.chatter.sidebands else 1.0
+    rising = surges(f, tracker.rising, config.hop)
+    surge = surging(rising, config.enter_ratio)
     unsteady = (outside and _doubles(p.samples)) or f.energy < FALLING * tracker.energy
-    judgement = judge(config, f, tracker.background, cut, tracker.held.kind, prior, warning, risen, unsteady)
+    judgement = judge(config, f, tracker.background, cut, tracker.held.kind, prior, warning, risen, surge, unsteady)
     heard = Agreement()
-    if tracker.held.kind not in ALARMS and asked(config, judgement):
-        heard = ask(f, judgement.kind, others, rate, turned, config.principal_teeth, config.band)
+    if not alarmed and asked(config, judgement):
+        small = surge if judgement.surges else None
+        heard = ask(f, judgement.kind, small, others, rate, turned, config.principal_teeth, config.band)
         judgement = with_others(judgement, heard)
     fresh = judgement.kind is ChatterKind.HOPF and (outside or blank.window_start_ns < tracker.entered_ns)
-    sure = risen > 1 or (bool(heard.confirm) and f.energy >= tracker.energy)
+    sure = risen > 1 or judgement.surges or (bool(heard.confirm) and f.energy >= tracker.energy)
     enter = windows_to_enter(config, f, tracker.background, tracker.held, sure, fresh)
     held = persist(config, tracker.held, judgement.kind, enter)
     entered = blank.window_end_ns if outside and held.kind not in OUTSIDE else tracker.entered_ns
@@ -179,7 +185,7 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
     return replace(tracker, held=held, background=background, belief=after(belief, f), history=history,
-                   entered_ns=entered, energy=f.energy), verdict
+                   entered_ns=entered, energy=f.energy, rising=rising), verdict
 
 
 def _doubles(x: Array) -> bool:
