@@ -41,10 +41,10 @@ class Rival:
 FITTED = "finds 95 % of training chatters"
 
 RIVALS = (
-    Rival("FFT energy ratio", 0.125, FITTED),
-    Rival("once-per-revolution variance", 0.649, FITTED),
+    Rival("FFT energy ratio", 0.330, FITTED),
+    Rival("once-per-revolution variance", 0.723, FITTED),
     Rival("Kalman comb, Teager-Kaiser", 0.2, "published"),
-    Rival("maximum entropy, sequential", 0.206, FITTED),
+    Rival("maximum entropy, sequential", 0.248, FITTED),
 )
 
 HOP = 0.05
@@ -59,8 +59,8 @@ WRONG = 0.01
 RANGE = (-6.0, 0.0)
 """Range of the densities [decades of energy share]."""
 
-STABLE = Density(*RANGE, (-5.08, -5.75, -1.93, -0.06, -0.71))
-CHATTER = Density(*RANGE, (-63.09, 104.03, -71.12, 31.66, -12.18))
+STABLE = Density(*RANGE, (-9.25, -13.06, -6.83, -2.33, -1.34))
+CHATTER = Density(*RANGE, (-62.16, 102.4, -70.24, 31.34, -12.18))
 
 GATE = 2.0
 LEARNED, LEARNED_LOUD = 0.05, 0.002

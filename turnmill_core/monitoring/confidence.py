@@ -22,13 +22,13 @@ EVIDENCE = ("1", "asynchronous", "half order", "near threshold", "noise", "comb"
             "change", "level")
 """Names of the evidence, in order; see :func:`evidence`."""
 
-_HALF_ORDER = (4.02, -0.82, -0.0, 0.16, -0.13, 0.04, -0.11, -0.13, -0.32, -0.05, 0.08)
+_HALF_ORDER = (3.98, -0.83, 0.01, 0.15, -0.11, 0.04, -0.13, -0.12, -0.32, -0.02, 0.06)
 
 WEIGHTS: dict[ChatterKind, tuple[float, ...]] = {
-    ChatterKind.AIR: (4.77, -0.84, 0.22, 0.01, 0.78, 0.0, -0.52, -0.2, -0.7, -0.08, -0.41),
-    ChatterKind.STABLE: (1.98, -0.86, -0.48, 0.16, -0.22, 0.04, -0.17, -0.2, -0.27, -0.1, 0.06),
-    ChatterKind.MARGINAL: (7.55, 2.03, -0.15, -2.14, 0.91, -0.35, 0.01, 0.07, -0.07, 0.02, -0.45),
-    ChatterKind.HOPF: (3.64, 1.11, -0.7, 0.27, 0.34, -0.35, -0.01, 0.01, -0.33, -0.01, 0.06),
+    ChatterKind.AIR: (4.07, -0.82, 0.02, 0.13, 0.79, -0.04, -0.53, -0.19, -0.7, -0.03, -0.42),
+    ChatterKind.STABLE: (1.75, -0.78, -0.58, 0.14, -0.26, 0.05, -0.14, -0.18, -0.26, -0.13, 0.08),
+    ChatterKind.MARGINAL: (5.08, -0.94, 0.51, -0.05, -0.05, -0.45, -0.64, -0.18, 0.17, -0.64, 0.15),
+    ChatterKind.HOPF: (3.53, 1.17, -0.68, 0.25, 0.35, -0.31, 0.13, 0.03, -0.24, 0.01, 0.04),
     ChatterKind.FLIP: _HALF_ORDER,
     ChatterKind.FLIP_OR_RUNOUT: _HALF_ORDER,
 }
