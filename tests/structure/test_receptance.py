@@ -146,6 +146,18 @@ def test_a_chucks_parameters_from_the_dummy(noise: float, within: float) -> None
     assert found.stiffness > 1e9
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_rounding_does_not_decide_whether_the_chuck_is_found(seed: int) -> None:
+    chuck = Chuck(CHUCK.modes, math.inf, 6.5e5, 0.0, 0.0)
+    bar, points, _, *_ = dummy(chuck)
+    f, rng = np.arange(100.0, 1600.0, 10.0), np.random.default_rng(seed)
+    held = on_chuck(bar, chuck)  # type: ignore[arg-type]
+    H = receptances(held, np.vstack([held.row(0.0), held.row(0.04)]), f)
+    H = H * (1 + 1e-12 * rng.normal(size=H.shape))
+    found = fit_chuck(bar, points, f, H[:, 0, 0], H[:, 0, 1], H[:, 1, 1])  # type: ignore[arg-type]
+    np.testing.assert_allclose(chuck_receptance(found, f), chuck_receptance(chuck, f), rtol=1e-4, atol=0)
+
+
 @pytest.mark.parametrize(("change", "message"), [
     ({"points": (0.02, 0.02)}, "different places"), ({"points": (0.0, 0.3)}, "place on the bar"),
     ({"frequency": np.zeros(60)}, "frequency"), ({"H11": np.full(60, np.nan)}, "H11"), ({"H22": np.ones(3)}, "H22"),

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from turnmill_core.operation import require
 from turnmill_core.operation_structure import Chuck, ChuckMode
 from turnmill_core.structure.beam import PlaneModel, free_receptances
 from turnmill_core.structure.modal import Complexes, Floats
 
-RIGID = 1e4
+RIGID = 1e6
 """A fitted joint this much stiffer than the whole dummy counts as rigid."""
 
 
@@ -159,19 +159,23 @@ def fit_chuck(
 
     bar, points [m], frequency [Hz] (k,), H11, H12, H22 [m/N] (k,) and errors: as in chuck_from_dummy. Least squares of
     the deviation relative to each FRF, from several starting frequencies; the noise of the measurement is not sent
-    through the decoupling.
+    through the decoupling. The unknowns are compliances, as FRFs are linear in them: a rigid joint is zero, not far
+    away.
     """
     f, (A, T, Z), H = _dummy(bar, points, frequency, H11, H12, H22)
     size = np.abs(H) + 0.02 * np.abs(H).max(axis=0)
     low, length = float(np.abs(H[0, 1, 1])), float(bar.nodes[-1])
+    units = np.array([low, low / length**2])
 
-    def chuck_of(x: Floats) -> Chuck:
-        pivot = -1 / x[3] if x[3] < -1e-9 else math.inf
-        across, around = math.exp(min(x[4], 60.0)), math.exp(min(x[5], 60.0))
-        rigid = across * low > RIGID, around * low > RIGID * length**2
-        return Chuck((ChuckMode(math.exp(x[0]), min(math.exp(x[1]), 0.99), math.exp(x[2]), pivot),),
-                     math.inf if rigid[0] else across, math.inf if rigid[1] else around,
-                     0.0 if rigid[0] else across * abs(x[6]), 0.0 if rigid[1] else around * abs(x[7]))
+    def chuck_of(x: Floats, softest: float = 0.0) -> Chuck:
+        """x: log frequency, log damping, the face's motion and turn, compliance and loss of the joint, scaled."""
+        frequency = math.exp(x[0])
+        mass = 1 / (low * (2 * math.pi * frequency * max(x[2], 1e-9)) ** 2)
+        pivot = -length * x[2] / x[3] if x[3] < 0 < x[2] else math.inf
+        stiffness = [1 / (u * c) if c > softest else math.inf for c, u in zip(x[4:6].tolist(), units, strict=True)]
+        damping = [0.0 if math.isinf(k) else k * loss / (2 * math.pi * f[-1])
+                   for k, loss in zip(stiffness, x[6:].tolist(), strict=True)]
+        return Chuck((ChuckMode(frequency, math.exp(x[1]), float(mass), float(pivot)),), *stiffness, *damping)
 
     def deviation(x: Floats) -> Floats:
         base = chuck_receptance(chuck_of(x), f)
@@ -179,12 +183,12 @@ def fit_chuck(
         flat = off[:, [0, 0, 1], [0, 1, 1]].ravel()
         return np.concatenate([flat.real, flat.imag])
 
-    scale = [0.05, 0.3, 0.3, 1.0, 1.0, 0.5, 1e-5, 1e-5]
-    found = []
-    for start in np.geomspace(1.2 * f[0], 0.8 * f[-1], 8):
-        mass = 1 / (low * (2 * np.pi * start) ** 2)
-        x = [math.log(start), math.log(0.03), math.log(mass), -1.0, math.log(30 / low), math.log(3 * length**2 / low),
-             1e-6, 1e-6]
-        found.append(least_squares(deviation, x, x_scale=scale, loss="soft_l1", max_nfev=60))
-    best = min(found, key=lambda r: r.cost)
-    return chuck_of(least_squares(deviation, best.x, x_scale=scale, loss="soft_l1", max_nfev=400).x)
+    def nearest(x: Floats, most: int) -> OptimizeResult:
+        return least_squares(deviation, x, bounds=(lowest, highest), x_scale="jac", loss="soft_l1", max_nfev=most)
+
+    lowest = np.array([math.log(0.5 * f[0]), math.log(1e-4), 0, -1e3, 0, 0, 0, 0])
+    highest = np.array([math.log(2 * f[-1]), math.log(0.5), 1e3, 0, 1e3, 1e3, 1, 1])
+    starts = np.geomspace(1.2 * f[0], 0.8 * f[-1], 8)
+    found = [nearest(np.array([math.log(start), math.log(0.03), 0.3, -0.3, 0.03, 0.3, 1e-3, 1e-3]), 60)
+             for start in starts]
+    return chuck_of(nearest(min(found, key=lambda r: r.cost).x, 400).x, 1 / RIGID)
