@@ -220,12 +220,14 @@ def test_after_warming_nothing_is_compiled_while_the_machine_chatters() -> None:
     code = """
 import numpy as np
 from dataclasses import replace
-from turnmill_core.monitoring._kernels import drift, family, resampling, sinusoids, spectrum, synchronous
+from turnmill_core.monitoring._kernels import (drift, family, lattice, resampling, sinusoids, spectrum,
+                                               synchronous)
 from turnmill_ros.monitor_join import FeedSettings, MonitorFeed
 from tests.test_monitor_join import RATE, ROWS, axes, blocks, operation
 
 def compiled():
-    return {(m.__name__, name): len(k.signatures) for m in (drift, family, resampling, sinusoids, spectrum, synchronous)
+    return {(m.__name__, name): len(k.signatures)
+            for m in (drift, family, lattice, resampling, sinusoids, spectrum, synchronous)
             for name, k in vars(m).items() if hasattr(k, "signatures")}
 
 op = operation()
@@ -234,7 +236,7 @@ before, feed, said = compiled(), MonitorFeed(FeedSettings(prior="none")), []
 feed.operation(0, op)
 for k, block in enumerate(blocks(op, 1.0)):
     t = (k * ROWS + np.arange(ROWS)) / RATE
-    tone = np.cos(2 * np.pi * 787 * t) * (1 + 0.3 * np.cos(op.tooth_passing_frequency * 2 * np.pi * t))
+    tone = (t > 0.4) * np.cos(2 * np.pi * 787 * t) * (1 + 0.3 * np.cos(op.tooth_passing_frequency * 2 * np.pi * t))
     said += feed.block(replace(block, samples=block.samples + tone[:, None].astype(np.float32)))
 for a in axes(op, 1.0):
     said += feed.axes(a)

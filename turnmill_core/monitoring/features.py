@@ -23,6 +23,9 @@ CANDIDATES = 4
 MOST_RISING, BESIDE = 8, 3.0
 """Lines looked at at the end of a window; how far [bins] from a tooth passing harmonic, which is wide there."""
 
+WIDE = 10.0
+"""Energy over that of a tooth passing harmonic from which a line beside it is none of the harmonic's width."""
+
 FOLDS = 2
 """Multiple of the sample rate up to which tooth passing harmonics may be folded into the band."""
 
@@ -114,7 +117,7 @@ def features(p: Prepared, turns: Array, steady: bool, teeth: int, lowest: float,
     clear = np.where(moved, 0.0, clear)
     first = np.flatnonzero(tooth & inside)[:12]
     asynchronous = tuple(x for x in lines(found, lowest, LINE_RATIO, 24) if not _is_skirt(x, found, layout, clear)
-                         and not _beside_tooth(x, tooth_frequency, apart * found.resolution))
+                         and not _widens_tooth(x, layout.frequency, teeth, clear, apart * found.resolution))
     asynchronous = tuple(x for x in _merged((*asynchronous, *turning), found.resolution) if not background.holds(x)
                          and not _is_folded(x, tooth_frequency, p.sampled, found.resolution))
     if teeth % 2:
@@ -140,7 +143,7 @@ def _rising(parts: Parts, p: Prepared, steady: bool, lowest: float, tooth_freque
     end = residual(parts.layout, parts.one, p, steady, rising=True)
     return tuple(x for x in lines(end, lowest, LINE_RATIO, MOST_RISING)
                  if not _is_skirt(x, end, parts.layout, clear) and not background.holds(x)
-                 and not _beside_tooth(x, tooth_frequency, BESIDE * end.resolution)
+                 and not _beside(x, tooth_frequency, BESIDE * end.resolution)
                  and not _is_folded(x, tooth_frequency, p.sampled, end.resolution))
 
 
@@ -215,9 +218,19 @@ def _is_skirt(x: Line, s: Spectrum, layout: Layout, energy: Array) -> bool:
     return bool(mirror > 0.25 * here)
 
 
-def _beside_tooth(x: Line, tooth_frequency: float, apart: float) -> bool:
+def _beside(x: Line, tooth_frequency: float, apart: float) -> bool:
     """True within `apart` [Hz] of a tooth passing harmonic."""
     return abs(math.remainder(x.frequency / tooth_frequency, 1.0)) * tooth_frequency < apart
+
+
+def _widens_tooth(x: Line, frequency: float, teeth: int, energy: Array, apart: float) -> bool:
+    """True for what a tooth passing harmonic that changes leaves within `apart` [Hz] of itself.
+
+    frequency [Hz], energy: of the spindle harmonics.
+    """
+    harmonic = teeth * round(x.frequency / (teeth * frequency))
+    return _beside(x, teeth * frequency, apart) and not (
+        harmonic < len(energy) and x.energy > WIDE * energy[harmonic] > 0)
 
 
 def _is_folded(x: Line, tooth_frequency: float, sampled: float, within: float) -> bool:
