@@ -182,3 +182,17 @@ def test_growing_chatter_is_seen_within_300_ms_of_20_percent() -> None:
     assert abs(chatter[0] - above[0]) < 0.3
     assert abs(chatter[-1] + 0.05 - above[-1]) < 0.3
     assert len(chatter) == round((chatter[-1] - chatter[0]) / 0.05) + 1
+
+
+@pytest.mark.parametrize(("amplitude", "heard"), [(1.5, True), (0.5, False)])
+def test_beside_a_tooth_harmonic_of_a_young_cut_only_what_is_far_louder_is_chatter(amplitude: float,
+                                                                                 heard: bool) -> None:
+    """5.5 Hz beside the third harmonic, whose amplitude is 1/3 and which is wide while a helical tool enters."""
+    speed = 3350 * RPM
+    t = phase(speed, 2.0)
+    at = np.arange(len(t)) / RATE
+    line = np.cos(2 * math.pi * (3 * 4 * 3350 / 60 + 5.5) * at)
+    x = np.where(at > 0.8, comb(t, 4), 0) + np.where(at > 1.1, amplitude * line, 0) + noise(len(t), 0.02, 3)
+    chatter = [v.window_end_ns / 1e9 for v in judged(x, 4, speed) if v.state is ChatterKind.HOPF]
+    assert 1.1 < chatter[0] < 1.4 if heard else chatter[0] > 1.3
+    assert chatter[-1] > 1.95
