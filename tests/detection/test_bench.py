@@ -249,14 +249,18 @@ def test_the_whole_corpus(whole: Tally) -> None:
     assert right > 0.8 * count
     assert count - right - undecided < 0.08 * count
     assert float(np.nanmedian(whole.delays)) < 0.3
+    assert whole.standings[0].before_tripled >= 0.8 * len(whole.delays)
+    changed, windows = whole.changed
+    assert changed <= 0.01 * windows > 0
 
 
 @pytest.mark.slow
 def test_no_published_indicator_has_as_few_false_alarms(whole: Tally) -> None:
-    """Fewer in total, each at its operating point, and no more at the recalls that are asked of a monitor."""
+    """Fewer in total, each at its operating point, and no more at any recall."""
     ours, *others = whole.standings
     assert all(ours.false_alarms < s.false_alarms for s in others)
-    false_at = np.nan_to_num(whole.false_at, nan=np.inf)[whole.recalls > 0.7]
+    false_at = np.nan_to_num(whole.false_at, nan=np.inf)
+    assert len(false_at) > 200
     assert (false_at[:, 1:] >= false_at[:, :1]).all()
 
 
