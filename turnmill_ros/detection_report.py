@@ -198,13 +198,15 @@ def delays_picture(found: Tally) -> figure:
     """Alarm of every depth ramp after the 20 % crossing beside the time in which the amplitude triples."""
     plot = figures.new_figure(f"Alarms on depth ramps (earlier than {LATE:g} s before the crossing: at the lower edge)",
                               "time from the crossing of 20 % to tripled amplitude [s]",
-                              "alarm after the crossing [s]", 300)
+                              "alarm after the crossing [s]", 300, x_axis_type="log")
     tripled, delays = np.array(found.tripled), np.array(found.delays)
     at = np.isfinite(tripled) & np.isfinite(delays)
     plot.scatter(tripled[at], np.maximum(delays[at], -LATE), size=8, color=figures.LINE_COLOURS[0],
                  legend_label="alarm")
-    ends = [0.0, float(tripled[at].max(initial=0.3))]
-    plot.line(ends, ends, color="#444444", line_dash="dashed", legend_label="tripled")
-    plot.line(ends, [LATE, LATE], color="#444444", line_dash="dotted", legend_label=f"{LATE:g} s")
+    highest = max(2 * LATE, 1.1 * float(delays[at].max(initial=0.0)))
+    until = np.geomspace(min(0.03, float(tripled[at].min(initial=1.0))), highest, 60)
+    plot.line(until, until, color="#444444", line_dash="dashed", legend_label="tripled")
+    plot.line([until[0], float(tripled[at].max(initial=1.0))], [LATE, LATE], color="#444444", line_dash="dotted",
+              legend_label=f"{LATE:g} s")
     figures.legend_right(plot)
     return plot
