@@ -196,3 +196,31 @@ def test_beside_a_tooth_harmonic_of_a_young_cut_only_what_is_far_louder_is_chatt
     chatter = [v.window_end_ns / 1e9 for v in judged(x, 4, speed) if v.state is ChatterKind.HOPF]
     assert 1.1 < chatter[0] < 1.4 if heard else chatter[0] > 1.3
     assert chatter[-1] > 1.95
+
+
+def test_a_chatter_keeps_its_name_while_a_sideband_is_stronger_and_loses_it_with_its_line() -> None:
+    """The line at 871.3 Hz holds half the energy of its upper sideband from 1.5 to 2.5 s; both end at 3 s."""
+    speed = 3350 * RPM
+    t = phase(speed, 4.0)
+    at = np.arange(len(t)) / RATE
+    inside, tooth = (at > 0.8) & (at < 3.0), 4 * 3350 / 60
+    upper = np.where((at > 1.5) & (at < 2.5), 1.2, 0.3)
+    lines = np.cos(2 * math.pi * 871.3 * at) * np.where(upper > 1, 0.85, 1) + upper * np.cos(
+        2 * math.pi * (871.3 + tooth) * at)
+    verdicts = judged(comb(t, 4) + np.where(inside, lines, 0) + noise(len(t), 0.02, 4), 4, speed)
+    named = [v.chatter_frequency for v in verdicts if v.state is ChatterKind.HOPF]
+    assert len(named) > 40
+    assert np.nanmax(np.abs(np.array(named) - 871.3)) < 2
+    held = [v for v in verdicts if v.state is ChatterKind.HOPF and v.reason is Reason.PERSISTENCE]
+    assert all(math.isfinite(v.chatter_frequency) or not v.chatter_family for v in held)
+    assert all(math.isnan(v.chatter_frequency) for v in verdicts if v.state is ChatterKind.STABLE)
+
+
+def test_without_a_name_before_the_strongest_line_names_it() -> None:
+    speed = 3350 * RPM
+    t = phase(speed, 2.0)
+    at = np.arange(len(t)) / RATE
+    lines = np.cos(2 * math.pi * 871.3 * at) + 1.3 * np.cos(2 * math.pi * (871.3 + 4 * 3350 / 60) * at)
+    verdicts = judged(comb(t, 4) + np.where(at > 0.8, lines, 0) + noise(len(t), 0.02, 4), 4, speed)
+    named = [v.chatter_frequency for v in verdicts if v.state is ChatterKind.HOPF]
+    assert np.nanmedian(named) == pytest.approx(871.3 + 4 * 3350 / 60, abs=1)

@@ -52,6 +52,9 @@ FALLING = 0.7
 OUTSIDE = (ChatterKind.AIR, ChatterKind.UNKNOWN)
 LONG_AGO_NS = -(2**62)
 
+STILL = 0.25
+"""Energy over that of the strongest line of a family from which the member that named it before goes on to do so."""
+
 APART = 1.3
 """Bins by which a line must then be away from a tooth passing harmonic."""
 
@@ -63,7 +66,7 @@ class Tracker:
     Held state; channel that is judged and its background; set_aside: backgrounds of channels that were judged before,
     by name; belief of the speed; history: strongest families of the last windows; runout: of the shank, as fibre probes
     see it; entered_ns: end of the window with which the cut began; energy: of the newest window;
-    rising: lines at its end.
+    rising: lines at its end; named: frequency of the chatter that is held [Hz] (NaN: none).
     """
 
     held: Held = field(default_factory=Held)
@@ -76,6 +79,7 @@ class Tracker:
     entered_ns: int = LONG_AGO_NS
     energy: float = 0.0
     rising: tuple[Surge, ...] = ()
+    named: float = math.nan
 
     def on(self, channel: str) -> Tracker:
         """Tracker that judges a channel: with its own background, and nothing else that depends on its scale."""
@@ -180,12 +184,15 @@ def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: A
     background = tracker.background
     if judgement.kind is ChatterKind.AIR and held.kind is ChatterKind.AIR:
         background = learn(config, background, f, spectrum(p.samples, p.rate, p.top))
-    verdict = _verdict(config, blank, f, judgement, held)
+    name = _name(f, judgement, surge, tracker.named) if held.kind is ChatterKind.HOPF else math.nan
+    verdict = _verdict(config, blank, f, judgement, held, name)
     found = evidence(f, judgement.asynchronous_ratio, judgement.half_order_ratio, config.enter_ratio,
                      held.kind != judgement.kind, tracker.background.energy)
     verdict = replace(verdict, confidence=confidence(held.kind, found))
+    if math.isnan(name) and held.kind is ChatterKind.HOPF:
+        name = tracker.named
     return replace(tracker, held=held, background=background, belief=after(belief, f), history=history,
-                   entered_ns=entered, energy=f.energy, rising=rising), verdict
+                   entered_ns=entered, energy=f.energy, rising=rising, named=name), verdict
 
 
 def _doubles(x: Array) -> bool:
@@ -206,13 +213,31 @@ def _growth(config: ChatterConfig, history: tuple[Seen, ...], f: Features,
     return history, time_to(history, config.enter_ratio)
 
 
-def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judgement, held: Held) -> Verdict:
+def _name(f: Features, judgement: Judgement, surge: Surge | None, before: float) -> float:
+    """Frequency [Hz] of the line that names Hopf chatter in a window; NaN where it shows none of it.
+
+    The strongest one, or the one that surges; but the line that named it before [Hz] while it is still strong, so
+    that the name does not jump between sidebands. A window that does not show Hopf chatter by itself has only the latter.
+    """
+    if judgement.surges and surge is not None:
+        return surge.frequency
+    same = max((x for x in f.lines if abs(x.frequency - before) < 2 / f.seconds), key=lambda x: x.energy, default=None)
+    if judgement.kind is not ChatterKind.HOPF or f.chatter is None:
+        return math.nan if same is None else same.frequency
+    H = f.chatter.frequency
+    strongest = max((x.energy for x in f.lines if x.frequency == H), default=0.0)
+    return same.frequency if same is not None and same.energy > STILL * strongest else H
+
+
+def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judgement, held: Held,
+             name: float) -> Verdict:
+    """name [Hz]: of Hopf chatter, if that is held."""
     reason, text = judgement.reason, judgement.text
     if held.kind != judgement.kind:
         reason, text = Reason.PERSISTENCE, f"held; this window by itself: {judgement.kind.name.lower()}, {text}"
-    frequency, members = math.nan, tuple[float, ...]()
-    if held.kind is ChatterKind.HOPF and f.chatter is not None:
-        frequency, members = f.chatter.frequency, f.chatter.members
+    frequency, members = name, tuple[float, ...]()
+    if held.kind is ChatterKind.HOPF and f.chatter is not None and math.isfinite(name):
+        members = f.chatter.members
     elif held.kind in (ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT):
         frequency, members = f.half.frequency, f.half.members
     return replace(
