@@ -217,7 +217,7 @@ def _name(f: Features, judgement: Judgement, surge: Surge | None, before: float)
     """Frequency [Hz] of the line that names Hopf chatter in a window; NaN where it shows none of it.
 
     The strongest one, or the one that surges; but the line that named it before [Hz] while it is still strong, so
-    that the name does not jump between sidebands. A window that does not show Hopf chatter by itself has only the latter.
+    that the name does not jump between sidebands. Only that line in a window that shows no Hopf chatter by itself.
     """
     if judgement.surges and surge is not None:
         return surge.frequency
