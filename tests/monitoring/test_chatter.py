@@ -211,6 +211,7 @@ def test_a_chatter_keeps_its_name_while_a_sideband_is_stronger_and_loses_it_with
     named = [v.chatter_frequency for v in verdicts if v.state is ChatterKind.HOPF]
     assert len(named) > 40
     assert np.nanmax(np.abs(np.array(named) - 871.3)) < 2
+    assert all(v.chatter_frequency in v.chatter_family for v in verdicts if v.chatter_family)
     held = [v for v in verdicts if v.state is ChatterKind.HOPF and v.reason is Reason.PERSISTENCE]
     assert all(math.isfinite(v.chatter_frequency) or not v.chatter_family for v in held)
     assert all(math.isnan(v.chatter_frequency) for v in verdicts if v.state is ChatterKind.STABLE)

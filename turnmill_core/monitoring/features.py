@@ -226,7 +226,8 @@ def _beside(x: Line, tooth_frequency: float, apart: float) -> bool:
 def _widens_tooth(x: Line, frequency: float, teeth: int, energy: Array, apart: float) -> bool:
     """True for what a tooth passing harmonic that changes leaves within `apart` [Hz] of itself.
 
-    frequency [Hz], energy: of the spindle harmonics.
+    Not for a line that is far stronger than the harmonic, where that is heard at all. frequency [Hz], of the spindle;
+    energy: of its harmonics.
     """
     harmonic = teeth * round(x.frequency / (teeth * frequency))
     return _beside(x, teeth * frequency, apart) and not (

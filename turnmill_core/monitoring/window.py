@@ -145,7 +145,8 @@ def judge_window(config: ChatterConfig, tracker: Tracker, s: Stream, end: int, s
 
 
 def _unknown(tracker: Tracker, blank: Verdict, reason: Reason, text: str) -> tuple[Tracker, Verdict]:
-    return replace(tracker, held=Held(), history=(), rising=()), replace(blank, reason=reason, reason_text=text)
+    tracker = replace(tracker, held=Held(), history=(), rising=(), named=math.nan)
+    return tracker, replace(blank, reason=reason, reason_text=text)
 
 
 def _judge_samples(config: ChatterConfig, tracker: Tracker, blank: Verdict, x: Array, rate: float, turned: Rotation,
@@ -221,12 +222,13 @@ def _name(f: Features, judgement: Judgement, surge: Surge | None, before: float)
     """
     if judgement.surges and surge is not None:
         return surge.frequency
-    same = max((x for x in f.lines if abs(x.frequency - before) < 2 / f.seconds), key=lambda x: x.energy, default=None)
-    if judgement.kind is not ChatterKind.HOPF or f.chatter is None:
+    hopf, c = judgement.kind is ChatterKind.HOPF, f.chatter
+    family = f.lines if c is None or not hopf else tuple(x for x in f.lines if x.frequency in c.members)
+    same = max((x for x in family if abs(x.frequency - before) < 2 / f.seconds), key=lambda x: x.energy, default=None)
+    if not hopf or c is None:
         return math.nan if same is None else same.frequency
-    H = f.chatter.frequency
-    strongest = max((x.energy for x in f.lines if x.frequency == H), default=0.0)
-    return same.frequency if same is not None and same.energy > STILL * strongest else H
+    strongest = max((x.energy for x in family if x.frequency == c.frequency), default=0.0)
+    return same.frequency if same is not None and same.energy > STILL * strongest else c.frequency
 
 
 def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judgement, held: Held,
@@ -236,7 +238,7 @@ def _verdict(config: ChatterConfig, blank: Verdict, f: Features, judgement: Judg
     if held.kind != judgement.kind:
         reason, text = Reason.PERSISTENCE, f"held; this window by itself: {judgement.kind.name.lower()}, {text}"
     frequency, members = name, tuple[float, ...]()
-    if held.kind is ChatterKind.HOPF and f.chatter is not None and math.isfinite(name):
+    if f.chatter is not None and name in f.chatter.members:
         members = f.chatter.members
     elif held.kind in (ChatterKind.FLIP, ChatterKind.FLIP_OR_RUNOUT):
         frequency, members = f.half.frequency, f.half.members

@@ -167,12 +167,15 @@ def fit_chuck(
     low, length = float(np.abs(H[0, 1, 1])), float(bar.nodes[-1])
     units = np.array([low, low / length**2])
 
-    def chuck_of(x: Floats, softest: float = 0.0) -> Chuck:
-        """x: log frequency, log damping, the face's motion and turn, compliance and loss of the joint, scaled."""
+    def chuck_of(x: Floats, rigid: float = 0.0) -> Chuck:
+        """x: log frequency, log damping, the face's motion and turn, compliance and loss of the joint, scaled.
+
+        rigid: compliance up to which a joint counts as rigid.
+        """
         frequency = math.exp(x[0])
         mass = 1 / (low * (2 * math.pi * frequency * max(x[2], 1e-9)) ** 2)
         pivot = -length * x[2] / x[3] if x[3] < 0 < x[2] else math.inf
-        stiffness = [1 / (u * c) if c > softest else math.inf for c, u in zip(x[4:6].tolist(), units, strict=True)]
+        stiffness = [1 / (u * c) if c > rigid else math.inf for c, u in zip(x[4:6].tolist(), units, strict=True)]
         damping = [0.0 if math.isinf(k) else k * loss / (2 * math.pi * f[-1])
                    for k, loss in zip(stiffness, x[6:].tolist(), strict=True)]
         return Chuck((ChuckMode(frequency, math.exp(x[1]), float(mass), float(pivot)),), *stiffness, *damping)
